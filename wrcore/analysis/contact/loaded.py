@@ -230,10 +230,11 @@ class LoadedWheels:
             if sign < 0.0:
                 mirror(out, 1, wrench)
             on_grid, on_fixed = self._counters[[ON_GRID, ON_FIXED]] > before[[ON_GRID, ON_FIXED]]
-            if on_grid and not self.refines:
+            rough = fields is not None and self._is_rough((pose[0], group), left, first, last, on_grid)
+            if on_grid and not (self.refines or rough):
                 x, a, b = out[0, [columns.X, columns.SEMI_A, columns.SEMI_B]]
                 yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, on_grid=True)
-            elif fields is not None and (self.always or on_grid):
+            elif fields is not None and (self.always or on_grid or rough):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
                 has = {"on_fixed": on_fixed}
@@ -242,6 +243,10 @@ class LoadedWheels:
                     has |= {"places": self._places()}
                 yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, **has)
             first, group = last, group + 1
+
+    def _is_rough(self, which, left, first, last, on_grid):
+        """Whether a patch (side, number) is to be solved on grids though strips, or a grid, have solved it."""
+        return False
 
     def _fields(self, row, load, pose, friction, back):
         """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid; a wheel that rolls

@@ -2,7 +2,13 @@
 
 import math
 
+import numpy as np
+
 from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.contact.patch import solve
+from wrcore.contact.patch.gap import CREST, GAP, SHAPE, TILT, frame_of_overlaps
+from wrcore.contact.patch.surfaces import ContactPlane, surface_gap
+from wrcore.contact.strip import make_pose
 from wrcore.dynamics.wheel import ON_FIXED, ON_GRID
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
@@ -14,6 +20,13 @@ FINER = (2.0, 1.75, 1.5, 1.0, 0.75)
 """Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them. Where no solution is
 found with the first number, the next ones are tried."""
 
+ROUGH = 0.05
+"""Share of its largest penetration by which a patch's gap may leave, on a strip and within its length, the parabola
+that strips know. A wave h cos(pi x/a) on a length 2a is flattened by a pressure pi E* h/(2a), Hertz's largest is
+2 E* d/(pi a): this share moves it by pi^2/4 of itself, 12 %, half a wave on that length by half as much."""
+
+_STATIONS = 81  # over the length of a patch
+
 _SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
 
 
@@ -22,7 +35,8 @@ class LoadedOnSlices(LoadedWheels):
 
     ``s`` (m) is the arc length of the wheelset's cross-section, ``turned`` (rad) the angle by which it has rolled. The
     rail is what a wheel sees of it in its pose (`wrcore.contact.seen_rail`). Strips know parabolas along the track, a
-    ``grid`` knows the surfaces: where an edge lies in a patch their greatest pressures differ."""
+    grid knows the surfaces: where these differ by more than `ROUGH` within a patch a grid takes over, and goes on until
+    the wheel is laid elsewhere, so that a search for a height does not step to and fro."""
 
     refines = False
 
@@ -30,6 +44,7 @@ class LoadedOnSlices(LoadedWheels):
         if model not in MODELS:
             raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
         self.pair, self.s, self.turned, self._seen = pair, 0.0, 0.0, {}
+        self._rough = {}
         super().__init__(self._blank(), model, *how, **more)
         self._levels = [round(f * self._still.strips.strips) for f in FINER]
         self._level = 0
@@ -75,7 +90,7 @@ class LoadedOnSlices(LoadedWheels):
         while True:
             before = self._stood_in()
             found = super().at_height(side, y, z, roll, yaw, rolling, friction, fields)
-            if self._stood_in() == before or self._level + 1 == len(self._levels):
+            if self._stood_in() == before or self._level + 1 == len(self._levels) or self._on_grids(side):
                 return found
             self._solve_with(self._level + 1)
 
@@ -83,16 +98,44 @@ class LoadedOnSlices(LoadedWheels):
         """Patches so far on which a grid or fixed strips stood in."""
         return self._counters[[ON_GRID, ON_FIXED]].sum()
 
+    def _on_grids(self, side):
+        """Patches of a wheel, where it lies now, that are solved on grids because no parabolas fit."""
+        pose = self._seen.get(side, (None,))[0]
+        return {group for (at, group), rough in self._rough.items() if at == side and rough == pose}
+
+    def _is_rough(self, which, left, first, last, on_grid):
+        """Whether no parabola fits the gap of a patch along the rail: see `ROUGH`."""
+        if self.always or left.vx < 0.0:
+            return False
+        side, group = which
+        if not on_grid and group not in self._on_grids(side) and self._misfit(left, first, last) > ROUGH:
+            self._rough[which] = self._seen.get(side, (None,))[0]
+        return group in self._on_grids(side)
+
+    def _misfit(self, left, first, last):
+        """By how much the gap leaves the parabolas of the strips solved last, over its largest penetration."""
+        work, pose = self._work, make_pose(*left[:6], self.spatial)
+        frame = frame_of_overlaps(self.geometry, pose, self._rows, first, last)
+        plane = ContactPlane(frame.x, frame.ur + self.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
+        gap = work.normal.gap[: work.solved[0]]
+        centre, half, middle = work.strips[[solve.CENTRE, solve.HALF_LENGTH, solve.MIDDLE], : len(gap)]
+        x = np.linspace(work.sums[solve.X_MIN], work.sums[solve.X_MAX], _STATIONS)
+        real = np.empty((2, x.size, centre.size))
+        surface_gap(self.geometry, pose, plane, x, centre, *real)
+        x = x[:, None]
+        off = real[0] / np.sqrt(1.0 + gap[:, TILT] ** 2) - gap[:, GAP] - gap[:, SHAPE] * (x - gap[:, CREST]) ** 2
+        return np.max(np.abs(off), where=np.abs(x - middle) < half, initial=0.0) / max(-gap[:, GAP].min(), 1e-9)
+
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """As for `LoadedWheels`, at ``s``."""
         touch = self._lie(side, y, roll, yaw)
         if math.isnan(touch):
             return math.nan
         z = touch - _SUNK if math.isnan(guess) else guess
-        for _ in FINER:  # anew where another number of strips has been taken on the way
-            level = self._level
+        for _ in FINER:  # anew where other strips, or a grid, have been taken on the way
+            level, grids = self._level, self._on_grids(side)
             z = super().height(side, y, load, roll, yaw, rolling, friction, vertical, z)
-            if self._level == level or math.isnan(z):
+            if math.isnan(z) or (self._level == level and self._on_grids(side) == grids):
                 break
         return z
 
