@@ -3,7 +3,7 @@
 import pytest
 
 from wrcore.errors import InputError
-from wrcore.errors.column_files import read_table, split_unit
+from wrcore.errors.column_files import read_column_file, read_table, split_unit
 
 PLAIN = "pose_id,y_m,yaw_rad\n007,0.001,0\nb,0.002,0.5\n"
 TAIL = PLAIN[:22] + PLAIN[22:].replace("\n", ",\n")
@@ -28,6 +28,9 @@ def read(tmp_path):
     "pose_id,y_mm,yaw_mrad\n007,1,0\nb,2,500\n", "pose_id;y [mm];yaw (mrad)\n007;1,0;0\nb;2,0;500,0\n",
     "pose_id,y,yaw\n-,mm,rad\n007,1,0\nb,2,0.5\n", PLAIN.replace("0.5", "0.5 # a remark"),
     PLAIN.replace("0.002", "2e-3").replace("0.001", "1.0D-03"), "! a comment\n" + PLAIN,
+    "'" + PLAIN.replace(",", "','").replace("\n", "'\n'").rstrip("'"),
+    "pose_id,y,yaw\n-,[mm],[rad]\n007,1,0\nb,2,0.5\n",
+    "pose_id;y;yaw\n;(mm);(mrad)\n007;1,0;0\nb;2,0;500,0\n", PLAIN.replace("pose_id", "'pose_id'"),
 ])  # fmt: skip
 def test_files_of_any_editor(read, content):
     frame = read(content)
@@ -66,3 +69,20 @@ def test_header_name_and_unit_are_told_apart(name, base, unit):
 def test_columns_beside_known_ones_keep_their_names_and_numbers(read):
     frame = read("pose_id,y_mm,a remark,Load_kN\na,1,good,5\n")
     assert frame.to_dict("list") == {"pose_id": ["a"], "y_m": [0.001], "a remark": ["good"], "Load_kN": [5.0]}
+
+
+def test_columns_of_one_name_are_refused(tmp_path):
+    """The first one would be taken without a word."""
+    path = tmp_path / "file.csv"
+    path.write_text("u_mm,f_mm,f_mm\n0,1,2\n")
+    with pytest.raises(InputError, match="line 1: expected each column once, got f_mm twice"):
+        read_column_file(path)
+
+
+def test_station_with_decimal_commas_keeps_the_files_mark(tmp_path):
+    """A cell that a reader has put in place of 12+450,25 has a point; the file has commas alone."""
+    path = tmp_path / "file.csv"
+    path.write_text("s_m;level_m\n12+450,25;0,001\n")
+    file = read_column_file(path)
+    file.cells[0][0] = "12450.25"
+    assert file.numbers([0, 1]).tolist() == [[12450.25, 0.001]]

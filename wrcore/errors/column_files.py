@@ -35,6 +35,7 @@ _ALL_UNITS = sorted({unit for units in UNITS.values() for unit in units}, key=le
 _NO_UNIT = "", "-", "1"
 _COMMENT = re.compile(r"#|(?:^|(?<=[\s,;]))[%!]")
 _QUOTED = re.compile(r'"[^"]*"')
+_SINGLE = re.compile(r"""(?:(?<=[\s,;])|^)'([^'"]*)'(?=[\s,;]|$)""")
 _WORD = re.compile(r'"[^"]*"|[^\s\[("]+(?:\s*[\[(][^\])]*[\])])?')  # with a unit in brackets
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?")
 _DECIMAL_COMMAS = "; decimal commas are read beside semicolons, tabs or blanks, and in quotes"
@@ -69,7 +70,8 @@ class ColumnFile(NamedTuple):
                     if not empty or cell not in NO_NUMBER:
                         raise self.fault(row, len(columns), expected) from None
                     table[row, k] = math.nan
-                commas, points = (cell, row) if "," in cell else commas, cell if "." in cell else points
+                commas = (cell, row) if "," in cell else commas
+                points = cell if "." in cell and cell in self.texts[row] else points  # not one put there by a reader
         if commas and points:
             expected = f"expected one decimal mark in a file, got {commas[0]} and {points}"
             raise InputError(self.path, f"line {self.lines[commas[1]]}", expected)
@@ -134,9 +136,13 @@ def read_column_file(path, rows=None, header=True):
     separator = _separator(texts, head[1])
     names = _split(head[1], _separator([head[1]], head[1], separator)) if head[1] else []
     names = names[: len(names) - _n_empty(names)]
+    twice = next((name for k, name in enumerate(names) if name and name in names[:k]), None)
+    if twice:
+        raise InputError(path, f"line {head[0]}", f"expected each column once, got {twice} twice")
     cells = _evened([_split(text, separator) for text in texts], len(names), separator)
     if names and cells and _are_units(cells[0], len(names)):
-        names = [name if unit in _NO_UNIT else f"{name} [{unit}]" for name, unit in zip(names, cells[0], strict=True)]
+        units = [cell.strip("[]() ") for cell in cells[0]]
+        names = [name if unit in _NO_UNIT else f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
         del cells[0], lines[0], texts[0]
     file = ColumnFile(str(path), tuple(names), head, cells, lines, texts)
     if separator == "," and not names and cells and len(cells[0]) > 2 and not any(re.search('[."]', x) for x in texts):
@@ -264,6 +270,7 @@ def _rows(text):
     """Lines that hold cells, and those that are comments, with their numbers."""
     rows, comments = [], []
     for k, line in enumerate(text.splitlines(), 1):
+        line = _SINGLE.sub(r'"\1"', line) if "'" in line else line
         bare = _QUOTED.sub(lambda quoted: "_" * len(quoted[0]), line) if '"' in line else line
         mark = _COMMENT.search(bare)
         cells = (line[: mark.start()] if mark else line).strip()
