@@ -177,3 +177,20 @@ def test_runs_are_sorted_by_folder_and_file(tmp_path):
         "suspended": ["planar", "spatial"],
     }
     assert cases["free"]["spatial"].scene["contact"]["detection"] == "spatial"
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "said"),
+    [
+        ("reason", 3, "attribute reason: expected text, got"),
+        ("format", "x" * 5000, "attribute format: expected 'wrcore run', got 'xxx"),
+    ],
+)
+def test_head_that_is_wrong_is_named_in_a_short_line(attribute, value, said, tmp_path):
+    hunting_run().save(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file.attrs[attribute] = value
+    sign(tmp_path / "run.h5")
+    with pytest.raises(InputError, match=said) as caught:
+        load_run(tmp_path / "run.h5")
+    assert len(str(caught.value)) < len(str(tmp_path)) + 150

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from wrcore.analysis.assessment.wheels import wheelsets_of
 from wrcore.analysis.pictures.plot_run import COLORS, HEIGHT, WIDTH, printed, values_of
-from wrcore.analysis.pictures.style import styled
+from wrcore.analysis.pictures.style import plain, styled
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import checked
 from wrcore.run.channels import unit_of
@@ -121,14 +121,14 @@ class Comparison:
             right.plot(self.t, factor * apart, color=COLORS[1])
             if (group, name) in stated.index and np.isfinite(error := factor * stated[group, name]):
                 right.axhspan(-error, error, color="0.85", zorder=0)
-            left.set_title(group.replace("_", " "), loc="left")
+            left.set_title(plain(group).replace("_", " "), loc="left")
             left.set(ylabel=label, xmargin=0)
             right.set(ylabel="difference" + "".join(label.partition(" / ")[1:]), xmargin=0)
         for axes in rows[-1]:
             axes.set_xlabel("time / s")
         first, second = (run.scene.get("name", "run") for run in self.runs)
         title = f"full: {first}, dashed: {second}; right: second less first, grey: stated error"
-        figure.suptitle(title, x=0.01, ha="left")
+        figure.suptitle(plain(title), x=0.01, ha="left")
         return figure
 
     def _shown(self) -> tuple[str, ...]:

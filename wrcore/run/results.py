@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from wrcore import __version__
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS as DESCRIPTIONS
@@ -222,7 +222,7 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
 def _check_format(path, file):
     found = file.attrs.get("format", "none")
     if found != FORMAT:
-        raise InputError(path, "attribute format", f"expected {FORMAT!r}, got {found!r}")
+        raise InputError(path, "attribute format", f"expected {FORMAT!r}, got {short(found)}")
     version = int(file.attrs["format_version"])
     if version != FORMAT_VERSION:
         expected = f"expected {FORMAT_VERSION}, got {version}: 'wrcore simulate' runs its scene again"
@@ -231,8 +231,10 @@ def _check_format(path, file):
 
 def _check_run(path, run):
     """What every other part of the package relies on."""
-    if run.status not in STATUSES or not isinstance(run.reason, str):
+    if run.status not in STATUSES:
         raise InputError(path, "attribute status", one_of(STATUSES, run.status))
+    if not isinstance(run.reason, str):
+        raise InputError(path, "attribute reason", f"expected text, got {short(run.reason)}")
     for name in RECORDS:
         if not isinstance(getattr(run, name), dict):
             raise InputError(path, f"attribute {name}", "expected a JSON object")

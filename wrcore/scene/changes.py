@@ -43,7 +43,7 @@ def _places_of(key):
     """A key path in parts, in which numbers of lists, and of points of a vehicle, have one name."""
     first, *parts = key.split(".")
     last = next((places[parts[-1]] for places in PLACES if parts and parts[-1] in places), None)
-    if first == "vehicle" and parts[0] in ("elements", "joints") and len(parts) > 3 and last:
+    if first == "vehicle" and len(parts) > 3 and parts[0] in ("elements", "joints") and last:
         parts[-1] = last
     return [first, *(str(int(part)) if part.isdecimal() else part for part in parts)]
 

@@ -192,16 +192,16 @@ def load_scene(
     >>> load_scene("config/scenes/wheelset.yaml", speed=30, contact__friction=0.4)
     Scene 'wheelset': Manchester wheelset, S1002 on UIC60-MBench, 30 m/s, spatial detection, 10 s
     """
-    return _asked_for(scene, changes_of(overrides, changes), trust or not isinstance(scene, StoredScene))
+    return _asked_for(scene, changes_of(overrides, changes), trust)
 
 
 def changed_by_caller(scene: Scene, overrides: Iterable[str] | Mapping[str, Any], undecided: Iterable[str]) -> Scene:
     """Change a scene as :func:`load_scene` does; keys that values of ``undecided`` keys may make void stay."""
-    return _asked_for(scene, changes_of(overrides, {}), True, undecided)
+    return _asked_for(scene, changes_of(overrides, {}), False, undecided)
 
 
-def _asked_for(scene, asked, trusted, undecided=()):
-    return _loaded(scene, asked, (), texts_in([value for _, _, value in asked]), trusted, undecided)
+def _asked_for(scene, asked, trust, undecided=()):
+    return _loaded(scene, asked, (), texts_in([value for _, _, value in asked]), trust, undecided)
 
 
 def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path, undecided: Iterable[str] = ()) -> Scene:
@@ -210,9 +210,9 @@ def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path, u
     return _loaded(scene, changes_of(changes, {}), folders, undecided=undecided)
 
 
-def _loaded(scene, asked, folders, named=(), trusted=True, undecided=()):
-    """The scene after the changes ``asked``; other arguments as for `Laws`."""
-    before = None
+def _loaded(scene, asked, folders, named=(), trust=False, undecided=()):
+    """The scene after the changes ``asked``; other arguments as for `Laws` and `load_scene`."""
+    before, trusted = None, trust or not isinstance(scene, StoredScene)
     if isinstance(scene, Scene):
         source, data, before, trusted = scene.source, copy.deepcopy(scene.data), scene.laws.known, scene.laws.trusted
         folders = dict.fromkeys((*scene.laws.folders, *folders))

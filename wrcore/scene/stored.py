@@ -8,7 +8,17 @@ from wrcore.kernels.named_laws import Laws
 
 
 class StoredScene(dict[str, Any]):
-    """Content of a scene that a run file holds: it may be anybody's, and names no law that is run unasked."""
+    """Content of a scene that a run file holds: it may be anybody's, and names no law that is run unasked. Copies, and
+    what is joined with others by ``|``, are such content, too."""
+
+    def copy(self) -> "StoredScene":
+        return StoredScene(self)
+
+    def __or__(self, other: Any) -> "StoredScene":
+        return StoredScene({**self, **other}) if isinstance(other, dict) else NotImplemented
+
+    def __ror__(self, other: Any) -> "StoredScene":
+        return StoredScene({**other, **self}) if isinstance(other, dict) else NotImplemented
 
 
 def laws_of_stored(scene: dict[str, Any], trust: bool) -> Laws:

@@ -25,6 +25,7 @@ from wrcore.run.reach import check_reach
 from wrcore.scene.changes import check_apart
 from wrcore.scene.description import Scene, changed_by_caller, changed_by_file
 from wrcore.scene.pairs import find_file
+from wrcore.scene.stored import StoredScene
 from wrcore.sweep.measures import MEASURES
 
 MOST_RUNS = 10_000_000  # runs of a sweep
@@ -114,6 +115,8 @@ def load_sweep(
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
     read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
+    if isinstance(source, Mapping) and isinstance(source["scene"], StoredScene):
+        read_from = StoredScene(read_from)
     check_apart(data["keys"], name, "keys")
     keys = data["keys"]
     scene = changed_by_caller(changed_by_file(read_from, data["set"], folder, undecided=keys), overrides, keys)

@@ -1,15 +1,19 @@
 """Texts of figures: what cannot be read is found, and every picture that a user can ask for is free of it."""
 
 import copy
+from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from study.report.legible import findings, save_figure
 from tests.synthetic import hunting_run
+from wrcore.analysis.compare import compare
+from wrcore.analysis.pictures.plot_contact import plot_pair
 from wrcore.analysis.pictures.plot_creep import plot_creep_force
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail
 from wrcore.analysis.pictures.plot_run import plot_run
@@ -164,3 +168,14 @@ def test_pressure_of_a_wheel_on_its_rail_stands_on_the_contact_line(s1002, uic60
         assert height.max() == pytest.approx(12.0, rel=0.2) and height[0] == height[-1] == 0.0
     with pytest.raises(InputError, match="a pose in which the wheel touches"):
         plot_wheel_on_rail(pair, z=0.48, load=5e4)
+
+
+@pytest.mark.parametrize("name", ["$\\nothing$", "5 $ and 6 $", "$x"])
+def test_dollar_signs_in_names_are_printed_as_they_are(name, s1002, uic60, tmp_path):
+    run = hunting_run()
+    run.scene["name"] = name
+    pair = WheelsetOnTrack.alike(replace(s1002, name=name), uic60)
+    for k, figure in enumerate((plot_run(run), compare(run, run).plot(), plot_pair(pair))):
+        figure.savefig(tmp_path / f"{k}.png")
+        title = figure.get_suptitle() or figure.axes[0].get_title()
+        assert not is_math_text(title) and name in title.replace("\\$", "$")

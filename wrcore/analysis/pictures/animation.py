@@ -63,7 +63,7 @@ def animate(run, scene, factor=None, begin=0.0, end=math.inf):
     for name in vehicle.body_names:
         if "yaw_rad" not in run.groups.get(name, {}):
             raise InputError("draw", name, "expected a run with the output channels pose and contact")
-    poses, path = {name: run.groups[name] for name in vehicle.body_names}, path_of(run)
+    poses, path = {name: run[name] for name in vehicle.body_names}, path_of(run)
     aside = {name: _aside(vehicle, path, name, poses[name], frames) for name in vehicle.body_names}
     largest = max(float(np.abs(shifts).max()) for shifts in aside.values())
     factor = _round(SHOWN / max(largest, 1e-6)) if factor is None else factor
@@ -130,12 +130,12 @@ def _body(vehicle, name, aside, yaw, factor):
 
 
 def _wheelset(run, scene, name, frames):
-    pose = run.groups[name]
+    pose = run[name]
     at = scene.vehicle.wheelset_names.index(name)
     return {
         "name": name, "y": _numbers(pose["y_m"][frames], 6), "z": _numbers(pose["z_m"][frames], 6),
         "roll": _numbers(pose["roll_rad"][frames], 7),
-        "wheels": [_wheel(run.groups[f"{name}/{side}"], side, scene.pair(side, at), frames) for side in SIDES],
+        "wheels": [_wheel(run[f"{name}/{side}"], side, scene.pair(side, at), frames) for side in SIDES],
     }  # fmt: skip
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, plain, styled
 from wrcore.contact.first_touch import first_touch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked
@@ -23,7 +23,9 @@ def fig_contact_location(pair, table):
     figure = Figure(figsize=(7.2, 3.2), layout="constrained")
     for axes, side in zip(figure.subplots(1, 2), SIDES, strict=True):
         _location(axes, pair, table, side)
-        axes.set_title(f"{side}, {getattr(pair, side).wheel.name} on {getattr(pair, side).rail.name}", fontsize=9)
+        axes.set_title(
+            plain(f"{side}, {getattr(pair, side).wheel.name} on {getattr(pair, side).rail.name}"), fontsize=9
+        )
     return figure
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wrcore.analysis.assessment.wheels import wheel_forces, wheelsets_of
-from wrcore.analysis.pictures.style import styled
+from wrcore.analysis.pictures.style import plain, styled
 from wrcore.errors import InputError, similar
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
@@ -70,7 +70,7 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     for axes, (quantity, lines) in zip(rows, panels, strict=True):
         _draw(axes, run, quantity, lines)
     rows[-1].set_xlabel("time / s")
-    figure.suptitle(f"{run.scene.get('name', 'run')}: {run.status}", x=0.01, ha="left")
+    figure.suptitle(plain(f"{run.scene.get('name', 'run')}: {run.status}"), x=0.01, ha="left")
     return figure
 
 
@@ -118,13 +118,13 @@ def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> 
             style |= {"marker": ".", "markersize": 3}
         for patch, column in enumerate(np.reshape(values, (len(run.t), -1)).T):
             if patch == 0 or not np.isnan(column).all():
-                axes.plot(run.t, factor * column, label=label.replace("_", " ") if patch == 0 else None, **style)
+                axes.plot(run.t, factor * column, label=plain(label).replace("_", " ") if patch == 0 else None, **style)
     axes.set(ylabel=ylabel, xmargin=0)
     if len(lines) > 1:
         look = {"fontsize": 7 if len(lines) > MOST_ENTRIES // 2 else 9, "ncols": -(-len(lines) // MOST_ENTRIES)}
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **look)
     else:
-        axes.set_title(next(iter(lines)).removesuffix(f".{quantity}").replace("_", " "), loc="left")
+        axes.set_title(plain(next(iter(lines)).removesuffix(f".{quantity}")).replace("_", " "), loc="left")
 
 
 def looks(labels: Sequence[str]) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
-from wrcore.analysis.pictures.style import ACCENT, styled
+from wrcore.analysis.pictures.style import ACCENT, plain, styled
 from wrcore.elements.kind import ends_of
 from wrcore.elements.kinds import KINDS
 from wrcore.vehicle.layout import FRAME_NAME
@@ -85,7 +85,7 @@ def plot_vehicle(scene):
     _list(words, parts)
     _legend(figure, parts, bodies)
     count = scene.data["vehicle"]["count"]
-    side.set_title(vehicle.name + (f", one of {count}" if count > 1 else ""), loc="left")
+    side.set_title(plain(vehicle.name) + (f", one of {count}" if count > 1 else ""), loc="left")
     return figure
 
 

@@ -36,6 +36,11 @@ def styled(function):
     return inner
 
 
+def plain(name):
+    """A name that others gave, as figures print it: its dollar signs begin no formula."""
+    return str(name).replace("$", r"\$")
+
+
 @styled
 def save_figure(figure, *paths):
     """Write a figure as ``.png`` and ``.svg`` by the paths' endings, folders created; equal figures give the same."""
