@@ -43,7 +43,9 @@ def canted_curve():
 
 
 def test_default_feedback_in_a_canted_curve_closes_joints(canted_curve):
-    """The roll of a cant ramp pulls joints apart: a Rosenbrock method's Jacobian is up to twenty steps old."""
+    """Root mean square of the gaps at 5 and 20 1/s: 0.68 and 0.16 um; with a Jacobian taken in full at each step, not
+    at every twentieth, 0.05 and 0.005 um. That part is the old Jacobian's. Of the error of y it is less: 0.54 and
+    0.41 um become 0.26 and 0.38 um."""
     model, start, times, _ = canted_curve
     gaps = []
     for feedback in (model.alpha, PAPER):
