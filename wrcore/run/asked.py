@@ -6,6 +6,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,16 @@ class Named(dict[str, float]):
 
     def __missing__(self, name: str) -> float:
         return self._find(name)[name]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Value of a channel, one that follows from others, too; else ``default``."""
+        try:
+            return self[name]
+        except InputError:
+            return default
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and self.get(name) is not None
 
 
 def told_by(
