@@ -183,3 +183,10 @@ def conicity_with(kind, curve):
     pair = {"wheel": S1002, "rail": named_profile("60E1", "rail", 1 / 40)} | {kind: curve}
     side = WheelOnRail(pair["wheel"], pair["rail"])
     return conicity_curve(WheelsetOnTrack(side, side), np.array([1e-3, 2e-3, 3e-3]))["equivalent_conicity"].to_numpy()
+
+
+def test_rail_head_that_is_a_wide_circle_is_read():
+    """Rails of roller rigs and of test cases are circles, 300 mm wide at a radius of 300 mm."""
+    u = np.linspace(-0.15, 0.15, 601)
+    profile = ProfileCurve.from_points(u, np.sqrt(0.3**2 - u**2) - 0.3, "rail", "circle")
+    assert abs(float(profile(0.1)) - (np.sqrt(0.3**2 - 0.01) - 0.3)) < 1e-6

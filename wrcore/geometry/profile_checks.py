@@ -25,6 +25,7 @@ _VERTICAL = 6.0  # slope of 80 degrees: flanges of wheels have 70 to 76, sides o
 _STEP = 5e-4  # m
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 _SIDES = 12e-3, 8e-3  # m below a rail's top: its sides, and the least depth that shows them
+_STEEP = 0.7  # slope; sides of rails and flanges of wheels are steeper, a circle of 300 mm reaches it at 172 mm
 _BESIDE, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
 _OUTWARD = (
     1.0 / 55.0
@@ -133,8 +134,12 @@ def check_rail(u, f, name, mends):
 
 
 def check_beside(u, f, name):
-    """Refuse points of a rail that lie beside its head, where neither its sides nor its foot are."""
+    """Refuse points of a rail that lie beside its head, where neither its sides nor its foot are. A curve that is
+    nowhere steep has no sides: rails of roller rigs and of tests are circles."""
     top = int(np.argmax(f))
+    slopes = np.abs(np.diff(f)) / np.maximum(np.abs(np.diff(u)), 1e-9)
+    if np.max(slopes[f[1:] > f[top] - _DEEP], initial=0.0) < _STEEP:
+        return
     sides = [_side(u, f, top, step, _SIDES[0]) for step in (-1, 1)]
     near = (f < f[top] - _SIDES[0]) & (f > f[top] - _DEEP)
     for edge, sign in zip(sides, (-1.0, 1.0), strict=True):
