@@ -166,7 +166,7 @@ def test_a_profile_of_a_file_is_shown(tmp_path, monkeypatch, capsys):
     )
     assert "<svg" in (tmp_path / "cone.svg").read_text()
     assert main(["profiles", "cone.prw"]) == 2
-    assert "got it outside: tape_circle or flange_back says where" in capsys.readouterr().err
+    assert "tape_circle, flange_back or shift says where it is" in capsys.readouterr().err
     (tmp_path / "top.csv").write_text("u_mm,f_mm\n" + "".join(f"{k},{-k * k / 600}\n" for k in u))
     assert main(["profiles", "top.csv"]) == 2
     assert "wrcore profiles: --kind: expected wheel or rail" in capsys.readouterr().err

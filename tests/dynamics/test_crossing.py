@@ -372,7 +372,7 @@ def test_stretches_lie_apart_and_name_their_keys():
     load_scene(CROSSING, {"track.crossing": [NOSE | {"rail": "left"}, NOSE]})
     load_scene(CROSSING, {"track.crossing": NOSE | {"slices": {"slices": "switch:500"}}})  # a formula, no file
     with pytest.raises(InputError, match="'left', 'right' or 'both'") as error:
-        load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"at": 30.0}]}, track__crossing__1__rail="inner")
+        load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"at": 30.0, "rail": "inner"}]})
     assert error.value.field == "track.crossing.1.rail"
     with pytest.raises(InputError, match="from 1/30 to 1/5") as error:
         load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"slices": "crossing:2"}]})

@@ -147,7 +147,7 @@ def test_contact_command_solves_poses(tmp_path, capsys):
         ("pose_id,y_m,yaw_rad\na,0,x\n", "row 1"),
         ("pose_id,y_m,yaw_rad\na,inf,0\n", "row 1"),
         ("pose_id,y_m,yaw_rad\na,3,0\n", "within 0.1"),  # millimetres
-        ("pose_id,y_m,yaw_rad,roll_mrad\na,0,0,1\n", "unknown column"),
+        ("pose_id,y_m,yaw_rad,roll_kg\na,0,0,1\n", "unknown column"),
         ("", "CSV"),
     ],
 )

@@ -5,6 +5,9 @@ from numbers import Real
 
 _DIGIT = re.compile(r"\d")
 
+_LONGEST = 2000
+"""Letters of a part of a message."""
+
 
 class InputError(ValueError):
     """Something a person wrote cannot be used; nothing has been started yet.
@@ -37,7 +40,12 @@ class InputError(ValueError):
         super().__init__(self.source, self.field, self.expected)  # what copies and other processes build it from
 
     def __str__(self):
-        return ": ".join(" ".join(part.split()) for part in self.args if part)
+        return ": ".join(_cut(" ".join(part.split())) for part in self.args if part)
+
+
+def _cut(part):
+    """A part of a message, without the middle of a text of thousands of letters."""
+    return part if len(part) <= _LONGEST else f"{part[: _LONGEST // 2]} ... {part[-_LONGEST // 2 :]}"
 
 
 class UnknownNameError(InputError, KeyError):
