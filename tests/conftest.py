@@ -3,6 +3,7 @@
 import atexit
 import os
 import shutil
+import signal
 import tempfile
 from pathlib import Path
 
@@ -57,6 +58,10 @@ kernels do not begin together; what is quick comes last, when one of them waits.
 # What a command says must not depend on whether its kernels are compiled already; tests of bars and announcements
 # take the variable away for themselves.
 os.environ["WRCORE_PROGRESS"] = "0"
+
+# A shell starts what runs in the background with Ctrl-C ignored: tests of interrupts need it as in the foreground.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items):

@@ -137,7 +137,7 @@ def test_advised_smoothing_follows_the_scatter(kind, capsys):
 @pytest.mark.parametrize(("name", "kind"), [("wheel_noise_2um.csv", "wheel"), ("rail_rounded.csv", "rail")])
 def test_advised_smoothing_mends_conicity(shared_file, capsys, name, kind):
     """Or 30 % less or more of it."""
-    spec = {"points": str(shared_file("cases", name)), "inclined": False}
+    spec = {"points": str(shared_file("cases", name))} | ({"inclined": False} if kind == "rail" else {})
     read_profile(spec, kind, 1 / 40)
     advice = float(re.search(r"\(smoothing: (\S+) evens", capsys.readouterr().err)[1])
     for share in (0.7, 1.0, 1.03, 1.3):

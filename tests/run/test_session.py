@@ -191,7 +191,7 @@ def test_from_where_it_was_saved_it_goes_the_same_way(method, tmp_path):
 
 def test_a_run_is_of_the_branch_that_was_restored():
     """Also forwards, beyond what the session has done since."""
-    session = wr.start(scene_of(), contact__friction={"left": 0.3, "right": 0.3})
+    session = wr.start(scene_of(**APART))
     session.run_until(0.05)
     root, found = session.save(), {}
     for friction in (0.05, 0.5):

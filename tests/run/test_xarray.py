@@ -26,7 +26,5 @@ def test_a_tree_has_the_groups_and_channels_with_units():
 
 def test_without_xarray_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(
-        wr.InputError, match=r'to_xarray: xarray: expected it installed: pip install "wrcore\[xarray\]"'
-    ):
+    with pytest.raises(wr.InputError, match="to_xarray: xarray: expected it installed: pip install xarray$"):
         hunting_run().to_xarray()
