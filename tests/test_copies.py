@@ -4,6 +4,7 @@ import copy
 import multiprocessing
 import pickle
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,10 +81,14 @@ def parts(thing):
         return {key: parts(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple):
         return [parts(value) for value in thing]
+    if isinstance(thing, set | frozenset):
+        return parts(sorted(thing, key=str))
     if isinstance(thing, partial):
         return [thing.func.__name__, parts(thing.args)]
     if hasattr(thing, "to_dict"):
         return parts(thing.to_dict("list"))
+    if isinstance(thing, Path):
+        return str(thing)
     if isinstance(thing, np.ndarray | np.generic | int | float | str | None):
         return thing
     return {"class": type(thing).__name__, **parts(vars(thing))}

@@ -8,6 +8,7 @@ from scipy.fft import next_fast_len
 from scipy.integrate import quad
 
 from wrcore.errors import InputError
+from wrcore.geometry import irregularity
 from wrcore.geometry.irregularity import (
     CHANNELS,
     _fast_length,
@@ -346,3 +347,12 @@ def test_several_files_and_a_spectrum_add_up_each_on_its_own_grid(tmp_path):
 def test_period_of_a_spectrum_is_the_fast_length_of_scipy():
     counts = [*range(1, 3000), 123_457, 1_000_001, 7_999_999]
     assert [_fast_length(count) for count in counts] == [next_fast_len(count, real=True) for count in counts]
+
+
+def test_sums_of_sums_and_of_none_keep_the_range_of_each():
+    one, other = (irregularity.irregularity_data(start, 0.25, np.ones((9, 4))) for start in (0.0, 10.0))
+    flat = irregularity.sum_of([one, other, one])
+    nested = irregularity.sum_of([irregularity.no_irregularity(), irregularity.sum_of([one, other]), one])
+    for name in flat._fields:
+        np.testing.assert_array_equal(getattr(nested, name), getattr(flat, name))
+    assert len(irregularity.irregularity_extents(nested)) == 3

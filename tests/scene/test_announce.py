@@ -8,7 +8,7 @@ from tests.conftest import ELLIPTIC
 from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import told_if_long, warn_once
-from wrcore.scene import description
+from wrcore.scene import creep, description
 from wrcore.scene.creep import announce, creep_of
 from wrcore.scene.description import load_scene
 
@@ -27,8 +27,8 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
         raise Known
 
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
-    monkeypatch.setattr(description, "kept_tables", lambda *_: ["a table"] if there else [])
-    monkeypatch.setattr(description, "ensure_table", ensure)
+    monkeypatch.setattr(creep, "kept_tables", lambda *_: ["a table"] if there else [])
+    monkeypatch.setattr(creep, "ensure_table", ensure)
     with pytest.raises(Known):
         creep_of(scene, None)
     said = capsys.readouterr().err.splitlines()
@@ -69,7 +69,7 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
     changes = {"contact.patch": "tabulated", "contact.detection": detection}
     with pytest.raises(Known):
         description.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
-    assert len(said) == lines and all("contact.patch moment" in line for line in said)
+    assert len(said) == lines and all("contact.patch to moment" in line for line in said)
 
 
 @pytest.mark.parametrize(

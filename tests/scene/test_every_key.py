@@ -25,7 +25,7 @@ from wrcore.geometry.standards import named_profile
 from wrcore.run import simulation
 from wrcore.run.checkpoints import digest_of, model_fingerprint
 from wrcore.run.simulate import simulate
-from wrcore.scene import description
+from wrcore.scene import creep, description
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.vehicle.description import build_vehicle
 
@@ -300,9 +300,9 @@ def record(monkeypatch, names):
     def stop(model):
         raise Stop(model)
 
-    monkeypatch.setattr(description, "ensure_table", instead)
-    monkeypatch.setattr(description, "load_table", instead)
-    monkeypatch.setattr(description, "kept_tables", lambda *_: ["a table"])
+    monkeypatch.setattr(creep, "ensure_table", instead)
+    monkeypatch.setattr(creep, "load_table", instead)
+    monkeypatch.setattr(creep, "kept_tables", lambda *_: ["a table"])
     monkeypatch.setattr(description, "warn_of_rigid_rails", lambda *_: None)
 
     def made(changes):
@@ -473,14 +473,14 @@ AIR = {
     "shear_stiffness": 1e5,
 }  # fmt: skip
 OWN_LAW = {
-    "kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests.elements.own_laws:two_in_series",
+    "kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:two_in_series",
     "parameters": [30.0, 5.0, 4.0], "states": 2,
 }  # fmt: skip
 MORE = [
     AIR, {"kind": "shear_spring", "at": [[0, 0.2, 1.8], [0, 0.2, 1.2]], "stiffness": [20.0, 30.0, 40.0],
           "bending_stiffness": 6.0, "damping": [1.0, 2.0, 3.0], "preload": [1.0, 2.0, 3.0]},
     {"kind": "bump_stop", "direction": "y", "at": [0, 0.2, 1.5], "gap": 0.02, "stiffness": 1e4},
-    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests.elements.own_laws:drag",
+    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:drag",
      "parameters": [30.0, 5.0], "states": 1},
     {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0, "preload": 4.0,
      "gap": 0.01},
@@ -513,7 +513,7 @@ def vehicle_with(element):
 def test_element_key_changes_the_forces(kind, key):
     schema, bases = KINDS[kind].keys[key], [item for item in [*EVERYTHING, *MORE] if item["kind"] == kind]
     values = {
-        "normal": ["e1"], "direction": ["z", "x"], "law": ["tests.elements.own_laws:plain_drag"], "states": [3],
+        "normal": ["e1"], "direction": ["z", "x"], "law": ["tests/elements/own_laws.py:plain_drag"], "states": [3],
         "characteristic": [], "at": [[0.2, 0.1, 1.4], [[0.3, 0.2, 1.7], [-0.4, 0.2, 1.1]]],
     }  # fmt: skip
     if "characteristic" in (key,):

@@ -110,7 +110,7 @@ def irregularity_data(start, step, values):
 
 def sum_of(parts):
     """IrregularityData of several ones that add up."""
-    sizes = [len(part.coefficients) for part in parts]
+    sizes = np.concatenate([np.diff(part.first) for part in parts])  # of each irregularity of each part
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in ("coefficients", "starts", "steps"))
     return IrregularityData(*joined, np.cumsum([0, *sizes]))
 
