@@ -348,6 +348,7 @@ def test_interrupted_twice_between_output_times_goes_on(tmp_path, monkeypatch):
     scene = load_scene(wr.example("suspended_wheelset"), {"integration.duration": 0.4, "output.rate": 4.0})
     told = []
     monkeypatch.setattr(Interrupts, "caught", signal.SIGINT)
+    monkeypatch.setattr("wrcore.integrate.integrator.FIRST_CHUNK", 4)  # attempts; 32 of them are the whole run
     for _ in range(2):
         run, number = simulate_to(scene, tmp_path / "run.h5", say=told.append)
         assert number == signal.SIGINT and run.reason.startswith("interrupted") and not len(run.t[1:])

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from wrcore.creep.table import show_progress
+from wrcore.dynamics.blame import LawWatch
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError, check_number, one_of, short
 from wrcore.errors.checked_calls import Within, checked
@@ -122,6 +123,7 @@ class Session:
         self._inputs: dict[str, Input] = inputs_of(self.scene, model)
         self._values = self._held = self._present_values()
         self.status, self.reason = "running", ""
+        self._in_python = LawWatch(model).in_python
         self._record = self._run.record(np.array([begin]))
         self._run.without_dispatch(self._record)
         self._rate = float(self.scene.data["output"]["rate"])
@@ -413,12 +415,16 @@ class Session:
         if self._values is not self._held:
             self._settle()
         record, given_up = self._record_to(t), ""
+        before = copy.deepcopy(self._run.checkpoint(self.time)) if self._in_python else None
         try:
             outcome = self._run.advance(record, CHUNK)
             while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
                 outcome = self._run.advance(record, min(CHUNK, self._headway.attempts_left()))
         except BaseException:  # Ctrl-C: the session stays where it was
-            self._run.begin_anew(self.time, self._state)
+            if before is None:
+                self._run.begin_anew(self.time, self._state)
+            else:  # in a plain Python law: no kernel was left halfway
+                self._run.go_on_from(before)
             raise
         times = record.times[: record.reached[0]].tolist()
         for time, state in zip(times, record.states, strict=False):
