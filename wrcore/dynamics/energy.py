@@ -29,7 +29,7 @@ from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.inertia import add_carried_gyroscopic, carrying, inertia_axes
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.suspension import element_energies, pack_elements
-from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at
+from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at, workspace
 from wrcore.dynamics.wheel import OUT_OF_RANGE, normal_contact
 from wrcore.kernels.jit import jit
 
@@ -149,11 +149,10 @@ def energy_channels(model, work, times, states):
     undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
     parts = []
     for variant in (model, touching, smooth, undamped):
-        work.arc_lengths[:] = begin
-        parts.append(_powers(times, states, variant, work))
+        parts.append(_powers(times, states, variant, _anew(variant, begin)))
     whole, contact, normal, hertz = parts
-    work.arc_lengths[:] = begin
-    rows = _energies(times, states, Equations(model, work).arguments, work)
+    again = _anew(model, begin)
+    rows = _energies(times, states, Equations(model, again).arguments, again)
     kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
     work.arc_lengths[:] = begin
     drives = _drive_powers(model, work, times, states) if len(model.drive.rows) else {}
@@ -166,6 +165,13 @@ def energy_channels(model, work, times, states):
     rows = (kinetic, height, stored, pressed, driven, joints, damped, normal - contact, -normal - elastic,
             stretching, rise, elastic)  # fmt: skip
     return dict(zip(CHANNELS, rows, strict=True)) | drives
+
+
+def _anew(model, arc_lengths):
+    """A workspace that knows arc lengths (k,), m, and no other evaluation: how many states there are changes no bit."""
+    work = workspace(model)
+    work.arc_lengths[:] = arc_lengths
+    return work
 
 
 def _track_energies(model, states, work):
