@@ -14,10 +14,10 @@ class StoredScene(dict[str, Any]):
     def copy(self) -> "StoredScene":
         return StoredScene(self)
 
-    def __or__(self, other: Any) -> "StoredScene":
+    def __or__(self, other: Any) -> "StoredScene":  # type: ignore[override]
         return StoredScene({**self, **other}) if isinstance(other, dict) else NotImplemented
 
-    def __ror__(self, other: Any) -> "StoredScene":
+    def __ror__(self, other: Any) -> "StoredScene":  # type: ignore[override]
         return StoredScene({**other, **self}) if isinstance(other, dict) else NotImplemented
 
 

@@ -201,7 +201,7 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution, wat
             else:
                 below, queue = row, []
             gap = rows[-1]["speed_m_per_s"] - below["speed_m_per_s"] if below and rows else 0.0
-            if gap > resolution:
+            if below and gap > resolution:
                 queue = [0.5 * (rows[-1]["speed_m_per_s"] + below["speed_m_per_s"])]
             watch.tell(
                 "falling", row, len(queue) + (math.ceil(math.log2(gap / resolution)) - 1 if queue and gap else 0)
