@@ -55,7 +55,9 @@ def calls():
              "shear_modulus": 8.2e10, "psi": 0.0}  # fmt: skip
     sweep = {"name": "s", "scene": str(SCENE), "set": SHORT, "sampling": {"kind": "grid"},
              "keys": {"speed": {"values": [20]}}, "measures": ["y_max_m"], "begin": 0.0}  # fmt: skip
-    plan = {"name": "p", "scene": str(SCENE), "distance": 1e4, "begin": 0.0, "set": SHORT, "scenes": [{"share": 1.0}]}
+    shorter = {key: value for key, value in SHORT.items() if key != "output.rate"}
+    plan = {"name": "p", "scene": str(SCENE), "distance": 1e4, "begin": 0.0, "rate": 1000.0, "set": shorter}
+    plan["scenes"] = [{"share": 1.0}]
     since = {"run": run, "begin": 0.0}
     found = {
         "assess": {**since, "standard": "EN 14363", "freight": False},
