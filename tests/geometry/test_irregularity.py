@@ -209,7 +209,7 @@ BAD_FILES = [
     (f"s_m,level\n{GOOD}", "level", "a column such as level_m or level_mm, got 'level' without a unit"),
     (f"s_m,level_mrad\n{GOOD}", "level_mrad", "a column such as level_m or level_mm"),
     (f"s_m,level_m,left_lateral_m\n{GOOD}", "header", "s_m and columns"),
-    (f"s_m,level_m,level_m\n{GOOD}", "header", "s_m and columns"),
+    (f"s_m,level_m,level_m\n{GOOD}", "line 1", "each column once, got level_m twice"),
     ("s_m,level_m\n0,0\n1,0\n2,0\n", "", "four rows"),
     ("s_m,level_m\n0,0\n1,high\n2,0\n3,0\n", "line 3", "two numbers, got '1,high'"),
     ("s_m,level_m\n0,0\n1,nan\n2,0\n3,0\n", "line 3", "2 finite numbers"),

@@ -152,7 +152,8 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
         ("u_mm,f_mm\n#\n" + "".join(f"{i % 7},0\n" for i in range(9)), {}, "line 10: expected strictly monotone"),
         ("1 2\n", {"unit": "feet"}, "unit: expected m, mm or inch"),
         ("1 2\n", {"units": "mm"}, "units: expected one of"),
-        ("1 2\n", {"inclined": "no"}, "inclined: expected true or false"),
+        ("1 2\n", {"mirrored": "no"}, "mirrored: expected true or false"),
+        ("1 2\n", {"inclined": False}, "inclined: expected this of rails only"),
         ("1 2\n", {"smoothing": "much"}, "smoothing: expected a distance"),
     ],
 )
