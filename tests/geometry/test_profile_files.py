@@ -228,7 +228,8 @@ def test_side_faces_at_equal_abscissae_are_left_out_of_columns(tmp_path):
 @pytest.mark.parametrize("smoothing", [0.001, 0])
 def test_smoothing_at_its_bounds_is_accepted(tmp_path, smoothing):
     path = write(tmp_path, "wheel.csv", "u_mm,f_mm\n" + columns(U, wheel()(U)))
-    read_profile({"points": str(path), "smoothing": smoothing}, "wheel")
+    read = read_profile({"points": str(path), "smoothing": smoothing}, "wheel")
+    assert abs(float(read(0.0))) < 1e-9 and np.max(np.abs(read(U) - wheel()(U))) < max(2.0 * smoothing, 1e-6)
 
 
 @pytest.mark.parametrize("spec", [{}, {"points": 3}, {"points": ""}, "absent.csv", "a\0b.csv"])

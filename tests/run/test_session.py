@@ -15,8 +15,8 @@ WHEELSET = {"speed": 50.0, "output.rate": 100.0, "integration.duration": 0.3}
 CURVE = [{"tangent": 15}, {"transition": 10}, {"curve": 100, "radius": 400, "cant": 0.08}]
 MOTOR = {"drive": {"motors": [{"name": "motor_1", "bodies": ["wheelset", "frame"], "torque": 0.0}]}}
 APART = {"contact.friction": {"left": 0.3, "right": 0.3}, "contact.patch": "moment"}
-"""With ellipses: a lookup table keeps the friction at which the session began; the motion is 2.5 um off that of a scene
-with the new friction."""
+"""With ellipses: a lookup table keeps the friction at which the session began, and the motion differs a little from
+that of a scene with the new friction."""
 
 
 def scene_of(name="suspended_wheelset", **changes):

@@ -6,7 +6,7 @@ column ``source`` of each table states both.
 
 * sum Y (guiding forces of a wheelset): sliding mean over 2 m; limit K (10 kN + 2 Q0 / 3), K = 1, freight wagons 0.85.
 * Y/Q (leading wheel of safety): sliding mean over 2 m; limit 0.8. Before both means the page has a low-pass of at least
-  20 Hz, which is left out: its start would add a transient, and the mean passes no more than that below 40 m/s.
+  20 Hz, which is left out: its start would add a transient. The mean has its first zero at V / 2 m, 20 Hz at 40 m/s.
 * Q (vertical force of a wheel): low-pass 20 Hz, 99.85 % only; limit 90 kN + Q0, at most 200 kN where 2 Q0 <= 225 kN
   (above 160 km/h the standard's cap is lower, recalled with low confidence: not applied).
 * Y_qst, Q_qst (quasi-static, full curves only): medians; limits 60 kN and 145 kN.
