@@ -392,10 +392,11 @@ def test_planar_error_bound_covers_the_missed_penetration(benchmark_pair):
 
 
 def test_auto_detection_chooses_by_the_bound():
-    overrides = ["contact.patch=moment", "integration.duration=0.6", "contact.detection_tolerance=1e-9"]
+    overrides = ["contact.patch=moment", "integration.duration=0.6"]
+    detections = {"planar": [], "spatial": [], "auto": ["contact.detection_tolerance=1e-9"]}
     run = {
-        d: simulate(load_scene(SCENES / "wheelset.yaml", [*overrides, f"contact.detection={d}"]))
-        for d in ("planar", "spatial", "auto")
+        d: simulate(load_scene(SCENES / "wheelset.yaml", [*overrides, f"contact.detection={d}", *more]))
+        for d, more in detections.items()
     }
     w = run["auto"]["wheelset"]
     assert np.array_equal(w.spatial_left, w.planar_error_left_m > 1e-9)

@@ -226,12 +226,16 @@ def test_what_cannot_be_worn_is_refused():
             local_wear(worn_run(), width=width)
 
 
-def exact_run(**changes):
+def run_with(patch, **changes):
     scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", {
-        "contact.patch": "exact", "contact.resolution": "coarse", "integration.duration": 0.1, "output.rate": 100.0,
+        "contact.patch": patch, "integration.duration": 0.1, "output.rate": 100.0,
         "output.channels": ["pose", "velocity", "contact", "wheel_motion"], "initial.y": 0.004, "speed": 40.0,
     } | changes)  # fmt: skip
     return scene, simulate(scene)
+
+
+def exact_run(**changes):
+    return run_with("exact", **{"contact.resolution": "coarse"} | changes)
 
 
 def test_exact_patches_lose_what_the_forces_of_an_exact_run_work():
@@ -255,7 +259,7 @@ def test_exact_patches_lose_what_the_forces_of_an_exact_run_work():
 def test_exact_patches_on_the_motion_of_ellipses():
     """Of the depth that an exact run leaves by exact patches they miss three fifths of what ellipses miss."""
     scene, exact = exact_run()
-    other, ellipses = exact_run(**{"contact.patch": "moment"})
+    other, ellipses = run_with("moment")
     ways = (
         local_wear(exact, 0.02, patches="exact", scene=scene),
         local_wear(ellipses, 0.02, patches="exact", scene=other),
@@ -341,7 +345,7 @@ def test_ellipses_stand_in_where_exact_patches_do_not_carry_the_wheel(monkeypatc
 
 
 def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
-    scene, run = exact_run(**{"contact.patch": "maximum", "integration.duration": 0.02})
+    scene, run = run_with("maximum", **{"integration.duration": 0.02})
     with pytest.raises(InputError, match=r"contact.patch: expected exact, tabulated or moment where .*got maximum"):
         local_wear(run, patches="exact", scene=scene)
     with pytest.raises(InputError, match="local_wear: scene: expected that of the run, but contact of it differ"):

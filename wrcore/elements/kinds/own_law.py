@@ -24,41 +24,36 @@ def wrapped(function, note):
     returned = function.overloads[own.signature_of(2, 3)].signature.return_type
     alone = not isinstance(returned, BaseTuple)
 
-    def call(elements, k, stretch, speed, state, rate, at):
-        row, end = elements.law[k], at + int(elements.directed[k, law.NUMBERS])
-        parameters = elements.parameters[row[law.FIRST] : row[law.LAST]]
-        return function(stretch, speed, state[at:end], parameters, rate[at:end])
-
-    def sum_of_states(elements, k, state, at):
-        total = 0.0
-        for i in range(at, at + int(elements.directed[k, law.NUMBERS])):
-            total += state[i]
-        return total
-
-    def look(elements, k, stretch, speed, rate, at, states, force):
-        found = force
-        for i in range(at, at + int(elements.directed[k, law.NUMBERS])):
-            found += rate[i]
-        note(stretch + speed + states, found)
-
     def of_force(elements, k, stretch, speed, state, rate, at):
-        states = sum_of_states(elements, k, state, at)
-        force = float(call(elements, k, stretch, speed, state, rate, at))
-        if sum_of_states(elements, k, state, at) != states:  # the law wrote to what it may only read
+        states, parameters, rates = own_arrays(elements, k, state, rate, at)
+        given = total(states)
+        force = float(function(stretch, speed, states, parameters, rates))
+        if total(states) != given:  # the law wrote to what it may only read
             force = np.nan
-        look(elements, k, stretch, speed, rate, at, states, force)
+        note(stretch + speed + given, force + total(rates))
         return force, 0.0, 0.0, force * speed
 
     def of_three(elements, k, stretch, speed, state, rate, at):
-        states = sum_of_states(elements, k, state, at)
-        force, stored, lost = call(elements, k, stretch, speed, state, rate, at)
+        states, parameters, rates = own_arrays(elements, k, state, rate, at)
+        given = total(states)
+        force, stored, lost = function(stretch, speed, states, parameters, rates)
         force = float(force)
-        if sum_of_states(elements, k, state, at) != states:
+        if total(states) != given:
             force = np.nan
-        look(elements, k, stretch, speed, rate, at, states, force)
+        note(stretch + speed + given, force + total(rates))
         return force, 0.0, float(stored), float(lost)
 
-    call, look, sum_of_states = map(own.uncached, (call, look, sum_of_states))
+    def own_arrays(elements, k, state, rate, at):
+        row, end = elements.law[k], at + int(elements.directed[k, law.NUMBERS])
+        return state[at:end], elements.parameters[row[law.FIRST] : row[law.LAST]], rate[at:end]
+
+    def total(numbers):
+        found = 0.0
+        for number in numbers:
+            found += number
+        return found
+
+    own_arrays, total = map(own.uncached, (own_arrays, total))
     return of_force if alone else of_three
 
 
