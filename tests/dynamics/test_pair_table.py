@@ -757,11 +757,6 @@ def test_another_profile_or_friction_is_another_table(own_cache, benchmark_pair)
     assert len({pair_store.pair_of(one).path for one in (contact, changed, slippery, coarse)}) == 4
 
 
-def test_one_creep_table_serves_all_that_is_looked_up():
-    """Nodes come with the package for that one: another tolerance would begin with an empty table."""
-    assert shipped_pair(**{"contact.creep.tolerance": 0.05}) is shipped_pair()
-
-
 def test_gauge_and_vehicle_are_not_of_the_table(own_cache, benchmark_pair):
     # a node solved with other distances from the middle of the track is the same but for rounding
     contact = LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value

@@ -239,7 +239,7 @@ def scene_bases(names):
     table = {**TABLE, "mu": [0.3, 0.2]}
     return [
         {"speed": 20.0, "wheel": {"profile": "S1002"}, "rail": {"profile": "60E1", "inclination": "1/40"}},
-        {"contact": {"detection": "spatial", "patch": "maximum"}},
+        {"contact": {"detection": "spatial", "patch": "maximum", "creep": {"model": "table"}}},
         {"contact": {"detection": "auto", "detection_tolerance": 1e-7, "patch": "moment", "creep": {
             "model": "polach", "least_speed": 1e-3, "k_A": 0.8, "k_S": 0.4},
             "normal": {"damping": {"c_e": 0.8, "v0": 0.05}},

@@ -6,30 +6,47 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import SCENES
+from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene import void_keys
 from wrcore.scene.changes import set_at
 from wrcore.scene.void_keys import VOID_KEYS
+from wrcore.sweep.batch import _changed
 
 SCENE = SCENES / "suspended_wheelset.yaml"
 
-VALID = {
-    "vehicle.spacing": ({"vehicle.count": 2}, 10.0, {"vehicle.count": 1}),
-    "contact.resolution": ({"contact.patch": "exact"}, "coarse", {"contact.patch": "moment"}),
-    "contact.slip": ({"contact.patch": "tabulated"}, "creepages", {"contact.patch": "maximum"}),
-    "contact.detection_tolerance": ({"contact.detection": "auto"}, 1e-6, {"contact.detection": "planar"}),
-    "contact.normal.damping.v0": ({"contact.normal.damping.c_e": 0.7}, 0.1, {"contact.normal.damping.c_e": 1.0}),
-    "contact.creep.k_A": ({"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "linear"}),
-    "contact.creep.k_S": ({"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "table"}),
-    "contact.creep.planes": ({"contact.creep.model": "table"}, "sdec", {"contact.creep.model": "she"}),
-    "contact.creep.tolerance": ({"contact.creep.model": "table"}, 0.02, {"contact.creep.model": "she"}),
-    "integration.step": ({"integration.method": "rk4"}, 1e-4, {"integration.method": "scipy_rk45"}),
-    "integration.rtol": ({"integration.step": 0.0}, 1e-6, {"integration.step": 1e-4}),
-    "integration.atol": ({"integration.step": 0.0}, 1e-8, {"integration.step": 1e-4}),
-    "integration.longest_step": ({"integration.step": 0.0}, 0.01, {"integration.step": 1e-4}),
-}
-"""Key: what it has an effect beside, a value, and what makes it void."""
+TABLE = "pyproject.toml"
+"""A file that stands for a creep table, which loading a scene does not read."""
+
+CASES = [
+    ("vehicle.spacing", {"vehicle.count": 2}, 10.0, {"vehicle.count": 1}),
+    ("contact.resolution", {"contact.patch": "exact"}, "coarse", {"contact.patch": "moment"}),
+    ("contact.slip", {"contact.patch": "tabulated"}, "creepages", {"contact.patch": "maximum"}),
+    ("contact.detection_tolerance", {"contact.detection": "auto"}, 1e-6, {"contact.detection": "planar"}),
+    ("contact.normal.damping.v0", {"contact.normal.damping.c_e": 0.7}, 0.1, {"contact.normal.damping.c_e": 1.0}),
+    ("contact.creep.k_A", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "linear"}),
+    ("contact.creep.k_S", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "table"}),
+    ("contact.creep.planes", {"contact.creep.model": "table"}, "sdec", {"contact.creep.model": "she"}),
+    ("contact.creep.tolerance", {"contact.creep.model": "table"}, 0.02, {"contact.creep.model": "she"}),
+    ("contact.creep.tolerance", {"contact.creep.model": "table"}, 0.02, {"contact.patch": "tabulated"}),
+    ("contact.creep.tolerance", {"contact.creep.model": "table"}, 0.02, {"contact.patch": "exact"}),
+    ("contact.creep.planes", {"contact.creep.model": "table"}, "sdec", {"contact.patch": "maximum"}),
+    ("contact.creep.table", {"contact.creep.model": "table"}, TABLE, {"contact.creep.model": "fastsim"}),
+    ("contact.creep.table", {"contact.creep.model": "table"}, TABLE, {"contact.patch": "tabulated"}),
+    ("contact.creep.table", {"contact.creep.model": "table"}, TABLE, {"contact.patch": "exact"}),
+    ("contact.creep.planes", {"contact.creep.model": "table"}, "sdec", {"contact.creep.table": TABLE}),
+    ("contact.creep.tolerance", {"contact.creep.model": "table"}, 0.02, {"contact.creep.table": TABLE}),
+    ("integration.step", {"integration.method": "rk4"}, 1e-4, {"integration.method": "scipy_rk45"}),
+    ("integration.rtol", {"integration.step": 0.0}, 1e-6, {"integration.step": 1e-4}),
+    ("integration.atol", {"integration.step": 0.0}, 1e-8, {"integration.step": 1e-4}),
+    ("integration.longest_step", {"integration.step": 0.0}, 0.01, {"integration.step": 1e-4}),
+]  # fmt: skip
+"""Key, what it has an effect beside, a value, and what makes it void."""
+
+EACH = pytest.mark.parametrize(
+    ("key", "valid", "value", "voider"), CASES, ids=[f"{key} beside {''.join(voider)}" for key, _, _, voider in CASES]
+)
 
 
 def scene_with(changes):
@@ -43,12 +60,11 @@ def scene_with(changes):
 
 
 def test_each_void_key_has_a_case_here():
-    assert {rule.key for rule in VOID_KEYS} == set(VALID)
+    assert {(rule.key, rule.by) for rule in VOID_KEYS} == {(key, *voider) for key, _, _, voider in CASES}
 
 
-@pytest.mark.parametrize("key", VALID)
-def test_key_stated_beside_what_makes_it_void_is_refused(key):
-    _, value, voider = VALID[key]
+@EACH
+def test_key_stated_beside_what_makes_it_void_is_refused(key, valid, value, voider):
     (by, other), *_ = voider.items()
     for asked in (lambda: wr.load_scene(scene_with({**voider, key: value})),
                   lambda: wr.load_scene(scene_with(voider), {key: value}),
@@ -57,9 +73,8 @@ def test_key_stated_beside_what_makes_it_void_is_refused(key):
             asked()
 
 
-@pytest.mark.parametrize("key", VALID)
-def test_key_of_the_scene_made_void_by_a_change_is_left_out(key, monkeypatch):
-    valid, value, voider = VALID[key]
+@EACH
+def test_key_of_the_scene_made_void_by_a_change_is_left_out(key, valid, value, voider, monkeypatch):
     said = []
     monkeypatch.setattr(void_keys, "say_once", said.append)
     scene = wr.load_scene(scene_with({**valid, key: value}))
@@ -70,9 +85,8 @@ def test_key_of_the_scene_made_void_by_a_change_is_left_out(key, monkeypatch):
     assert len(said) == 2 and all(f"{key} {value!r} is left out" in line and "\n" not in line for line in said)
 
 
-@pytest.mark.parametrize("key", VALID)
-def test_scene_with_all_defaults_is_read_again(key):
-    _, _, voider = VALID[key]
+@EACH
+def test_scene_with_all_defaults_is_read_again(key, valid, value, voider):
     data = wr.load_scene(scene_with(voider)).data
     assert wr.load_scene(data).data == data
 
@@ -87,3 +101,13 @@ def test_scene_of_a_sweep_keeps_keys_that_some_of_its_runs_use():
         wr.load_sweep(plan | {"keys": {"speed": {"values": [20.0]}}})
     with pytest.raises(InputError, match="keys.contact.slip: .*contact.slip: expected no such key"):
         wr.load_sweep(plan | {"set": {}, "keys": {"contact.slip": {"values": ["creepages"]}}})
+
+
+def test_run_of_a_sweep_reads_the_table_that_a_single_run_reads():
+    plan = {
+        "name": "s", "scene": scene_with({}), "sampling": {"kind": "grid"}, "set": {"contact.creep.tolerance": 0.05},
+        "keys": {"contact.patch": {"values": ["moment", "tabulated"]}},
+    }  # fmt: skip
+    sweep = wr.load_sweep(plan)
+    made = [_changed(sweep.scene, values).data["contact"]["creep"] for values in sweep.runs.to_dict("records")]
+    assert [creep["tolerance"] for creep in made] == [0.05, DEFAULT_TOLERANCE]

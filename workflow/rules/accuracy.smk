@@ -42,7 +42,6 @@ rule accuracy_exact:
         core=CORE["simulation"] + CORE["accuracy"],
         scenes=SCENES,
         scene=measured_scene,
-        table=rules.creep_table.output,
     output:
         run="<results>/accuracy/{measured}_exact.h5",
         table="<results>/accuracy/{measured}_exact.csv",

@@ -107,7 +107,7 @@ CORE = {
     "geometry": sources(*LOADED, *SCENE, "study/paper/motion", "study/paper/tables"),
     "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
-    "simulation": sources(*RUN),
+    "simulation": sources(*RUN, "study/creep_table"),
     "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
     "vehicle_figures": sources("run", *VEHICLE, *STYLE, "study/speeds"),
     "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),

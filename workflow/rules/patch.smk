@@ -11,7 +11,6 @@ rule patch_costs:
         core=CORE["patch"] + sources("study/cost/recorded", "study/cost/timing"),
         scenes=SCENES,
         scene=PATCH["cost"]["scene"],
-        table=rules.creep_table.output,
     output:
         report(
             "<results>/patch/costs.csv",
@@ -63,7 +62,6 @@ rule looked_up_cells:
         core=CORE["patch"],
         scenes=SCENES,
         scene=PATCH["cells"]["scene"],
-        table=rules.creep_table.output,
     output:
         cells="<results>/patch/looked_up_cells.csv",
         figure=report(

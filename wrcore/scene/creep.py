@@ -42,21 +42,17 @@ def announce(text):
 
 
 def creep_of(scene: Any, progress: Any) -> Any:
-    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table.
-
-    What is looked up lies beside one creep table, whichever the scene names: that for which nodes come with the
-    package."""
+    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
     contact = scene.data["contact"]
     creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
     factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
     if creep["model"] != "table":
         law = None if creep["model"] in LAWS else _creep_law(scene)
         return creep_data(nu, factors=factors, law=law)
-    looked_up = contact["patch"] == "tabulated"
-    if "table" in creep and not looked_up:
+    if "table" in creep:
         table = load_table(creep["table"])
     else:
-        tolerance = DEFAULT_TOLERANCE if looked_up else creep["tolerance"]
+        tolerance = creep["tolerance"]
         if not kept_tables(nu, creep["planes"], tolerance):
             announce(f"building a creep table ({creep['planes']}, {tolerance:g}): some ten seconds, once")
         table = ensure_table(nu, creep["planes"], tolerance, progress)

@@ -343,7 +343,7 @@ def compile_scene(
         vehicle.bodies,
         ContactModel(
             geometry, hertz_table(), LAWS.get(contact["creep"]["model"], OWN),
-            _kept(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
+            _kept(shared, "creep", (*contact["creep"].values(), *material.values()),
                   lambda: creep_of(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),

@@ -33,6 +33,7 @@ REFERENCES = ("scipy_", "cvode")
 """Beginnings of the names of methods of other packages."""
 
 _STRIPS = "contact.patch", lambda patch: patch in REDUCTIONS, "which has no strips, unlike exact and tabulated"
+_ELLIPSES = "contact.patch", lambda patch: patch not in REDUCTIONS, "which has creep forces of its own"
 _FIXED = "integration.step", lambda step: step > 0.0, "which fixes the length of all steps"
 _LAW = "contact.creep.model", lambda model: model != "table", "which has no table"
 _TABLE = "contact.creep.table", lambda table: table is not None, "which has its own planes and tolerance"
@@ -46,7 +47,8 @@ VOID_KEYS: tuple[VoidKey, ...] = (
     VoidKey("contact.normal.damping.v0", "contact.normal.damping.c_e", lambda c_e: c_e == 1.0, "which damps nothing"),
     *(VoidKey(f"contact.creep.{key}", *_POLACH) for key in ("k_A", "k_S")),
     VoidKey("contact.creep.planes", "contact.patch", lambda patch: patch != "moment", "unlike moment"),
-    *(VoidKey(f"contact.creep.{key}", *_LAW) for key in ("planes", "tolerance")),
+    *(VoidKey(f"contact.creep.{key}", *_ELLIPSES) for key in ("table", "tolerance")),
+    *(VoidKey(f"contact.creep.{key}", *_LAW) for key in ("table", "planes", "tolerance")),
     *(VoidKey(f"contact.creep.{key}", *_TABLE) for key in ("planes", "tolerance")),
     VoidKey(
         "integration.step", "integration.method", lambda name: name.startswith(REFERENCES), "which finds its steps"

@@ -6,6 +6,7 @@ equilibrium. A run then costs its integration and two to four milliseconds (repo
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import glob
 import hashlib
@@ -38,6 +39,7 @@ from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y, counters_of
 from wrcore.scene.changes import with_value
 from wrcore.scene.description import Scene, changed_by_file, compile_scene
+from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
 from wrcore.sweep.measures import COUNTERS, FORCES, MOTION, Motions, wheel_forces, wheelset_motion
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 
@@ -158,6 +160,9 @@ def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
     data = scene.data
     for key, value in values.items():
         data = with_value(data, key, value)
+    if not ALL_OTHERS.isdisjoint(values):
+        data = copy.deepcopy(data)
+        leave_out_void_keys(data, scene.source, values)
     changed = dataclasses.replace(scene, data=data)
     vars(changed)["alike"] = scene.alike  # made of parts that are shared
     return changed

@@ -1,15 +1,12 @@
 """One scene with exact contact at two resolutions: the run that models are compared with, and what it depends on."""
 
-import os
 import sys
 
 from study.accuracy.models import exact_row, exact_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, source = snakemake.params.settings, snakemake.input.scene
-table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
-overrides = [f"contact.creep.table={table}", *settings["overrides"]]
-finer, coarser = exact_runs(source, overrides, settings["exact"], settings["duration"])
+finer, coarser = exact_runs(source, settings["overrides"], settings["exact"], settings["duration"])
 finer.save(snakemake.output.run)
 exact_row(finer, coarser).to_csv(snakemake.output.table, index=False)
 print(exact_row(finer, coarser).T.to_string())

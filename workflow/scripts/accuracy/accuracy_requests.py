@@ -1,19 +1,19 @@
 """Accuracies asked for on random scenes, against two tight runs of each."""
 
-import os
 import sys
 
 import pandas as pd
 
 from study.accuracy.requests import judged, random_scene, summary
+from study.creep_table import with_creep_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, parts = snakemake.params.settings, []
 for seed in range(settings["first"], settings["first"] + settings["count"]):
     kind, changes = random_scene(seed, settings["seconds"])
     source = f"config/scenes/{kind}.yaml"
-    table = {"contact.creep.table": os.path.relpath(snakemake.input.table[0], os.path.dirname(source))}
-    rows = judged(source, changes | table, settings["of"], settings["tight"])
+    changes = with_creep_table(source, changes, snakemake.input.table[0])
+    rows = judged(source, changes, settings["of"], settings["tight"])
     print(seed, kind, changes, rows.to_string(), sep="\n")
     parts.append(rows.assign(seed=seed, kind=kind, changes=str(changes)))
 table = pd.concat(parts, ignore_index=True)

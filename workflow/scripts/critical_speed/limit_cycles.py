@@ -1,18 +1,18 @@
 """Limit cycles of one vehicle over speed, from a large disturbance downwards and from a small one upwards."""
 
-import os
 import sys
 
+from study.creep_table import with_creep_table
 from wrcore.analysis.stability.limit_cycles import Settling, limit_cycles
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params, source = snakemake.params, snakemake.input.scene
 settings = dict(params.settings)
-table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
-changes = [f"contact.creep.table={table}", "initial.y=0.0", f"contact.detection={snakemake.wildcards.detection}"]
+overrides = with_creep_table(source, params.overrides, snakemake.input.table[0])
+changes = [*overrides, "initial.y=0.0", f"contact.detection={snakemake.wildcards.detection}"]
 settling = Settling(**settings.pop("settling"))
-cycles = limit_cycles(load_scene(source, [*params.overrides, *changes]), params.speeds, settling, **settings)
+cycles = limit_cycles(load_scene(source, changes), params.speeds, settling, **settings)
 if cycles.attrs.get("stopped"):
     raise KeyboardInterrupt  # a part of the table is no result of the job
 cycles.insert(0, "detection", snakemake.wildcards.detection)

@@ -1,16 +1,15 @@
 """Run one case's spatial twins: with tighter tolerances, and started on the other side of the track."""
 
-import os
 import sys
 
+from study.creep_table import with_creep_table
 from wrcore.run.results import write_run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-# a scene names files relative to its own folder
-table = os.path.relpath(snakemake.input.table[0], os.path.dirname(snakemake.input.scene))
-overrides = [*snakemake.params.overrides, f"contact.creep.table={table}", "contact.detection=spatial"]
+overrides = with_creep_table(snakemake.input.scene, snakemake.params.overrides, snakemake.input.table[0])
+overrides = [*overrides, "contact.detection=spatial"]
 start = load_scene(snakemake.input.scene, overrides).data["initial"]["y"]
 twins = {
     "tight": [f"integration.{key}={snakemake.params.twins[key]}" for key in ("rtol", "atol")],

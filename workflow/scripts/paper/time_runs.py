@@ -1,9 +1,9 @@
 """Time planar and spatial runs in pairs, with nothing beside them."""
 
-import os
 import sys
 from functools import partial
 
+from study.creep_table import with_creep_table
 from study.paper.tables import time_runs
 from wrcore.scene.description import load_scene
 
@@ -19,9 +19,7 @@ def scene_of(scene, changes, detection, repetition):
 
 cases = {}
 for case, (scene, overrides) in params.cases.items():
-    # a scene names files relative to its own folder
-    table = os.path.relpath(snakemake.input.table[0], os.path.dirname(scene))
-    changes = [*overrides, f"contact.creep.table={table}"]
+    changes = with_creep_table(scene, overrides, snakemake.input.table[0])
     cases[case] = partial(scene_of, scene, changes)
     if case in params.first:
         short = f"integration.duration={params.first[case]}"

@@ -1,6 +1,5 @@
 """Cells of the table of exact contact that one run fills: a table, and a figure."""
 
-import os
 import sys
 
 from study.patch.cells import fig_cells, filled_by_run, told
@@ -8,8 +7,7 @@ from study.report.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 source, output = snakemake.input.scene, snakemake.output
-table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
-cells, lobes = filled_by_run(source, [f"contact.creep.table={table}", *snakemake.params.overrides])
+cells, lobes = filled_by_run(source, snakemake.params.overrides)
 cells.to_csv(output.cells, index=False)
 print(told(cells).to_string())
 save_figure(fig_cells(cells, lobes), output.figure, output.svg)

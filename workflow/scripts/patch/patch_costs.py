@@ -1,14 +1,11 @@
 """Cost of a patch with each model, all in turn, nothing beside them."""
 
-import os
 import sys
 
 from study.patch.costs import patch_costs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, source = snakemake.params.settings, snakemake.input.scene
-table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
-overrides = [f"contact.creep.table={table}", *snakemake.params.overrides]
-costs = patch_costs(source, overrides, snakemake.params.models, settings["states"], settings["passes"])
+costs = patch_costs(source, snakemake.params.overrides, snakemake.params.models, settings["states"], settings["passes"])
 costs.to_csv(snakemake.output[0], index=False)
 print(costs.to_string())

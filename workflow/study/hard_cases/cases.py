@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import simpson
 
+from study.creep_table import with_creep_table
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.marker import FRAME
@@ -75,12 +76,16 @@ class Setting:
 
 
 def prepare(vehicles, name, changes=(), **parts):
-    """A vehicle of the study (``scene`` and ``set``, changes to it, by name) as a `Setting`, with further changes to
-    the scene; ``parts`` are attributes of the scene to be replaced, such as ``wheel`` or ``track``.
+    """A vehicle of the study as a `Setting`, with further changes to the scene. By name, ``vehicles`` hold ``scene``,
+    ``set`` (changes to it) and ``table`` (path of a creep table; left out: the default one). ``parts`` are attributes
+    of the scene to be replaced, such as ``wheel`` or ``track``.
     """
     entry = vehicles[name]
     chosen = {**entry.get("set", {}), **dict(changes)}
-    scene = load_scene(entry["scene"], [f"{key}={value}" for key, value in chosen.items()])
+    overrides = [f"{key}={value}" for key, value in chosen.items()]
+    if "table" in entry:
+        overrides = with_creep_table(entry["scene"], overrides, entry["table"])
+    scene = load_scene(entry["scene"], overrides)
     scene = replace(scene, **parts) if parts else scene
     model, state = compile_scene(scene)
     label = {"vehicle": name, "detection": scene.detection, "integrator": scene.data["integration"]["method"]}
