@@ -11,6 +11,7 @@ from tests.scene import own_laws
 from tests.scene.own_laws import TABLE, waves
 from wrcore.creep.laws import GROUP
 from wrcore.errors import InputError
+from wrcore.kernels.handles import Kind
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.scene.description import compile_scene
 
@@ -43,6 +44,14 @@ def test_friction_that_falls_with_slip_is_the_formula():
     rates = [found["wheelset"].wy_rad_per_s for found in (one, other, flat)]
     np.testing.assert_allclose(rates[0], rates[1], rtol=0, atol=1e-3)
     assert rates[0][-1] < 0.5 * rates[2][-1]  # it slides where mu does not fall
+
+
+def test_a_law_of_friction_compiles_no_kernel_anew():
+    """A type of its own, such as that of an array not to be written to, would cost a minute of compilation."""
+    own = {"falling": {"law": f"{LAWS}falling", "length": 40.0, "spacing": 0.01}}
+    along = {"law": f"{LAWS}friction", "length": 20.0, "spacing": 0.5}
+    scenes = [wr.load_scene(SCENE, {"contact.friction": friction}) for friction in (0.3, {"mu": 0.3} | own, along)]
+    assert len({Kind(compile_scene(scene)[0])._numba_type_ for scene in scenes}) == 1
 
 
 def test_irregularity_is_what_a_file_of_it_is(tmp_path):

@@ -94,7 +94,7 @@ def _falling(spec, source, field, laws, call):
     if values is None:
         return None
     _within(values, LEAST_FACTOR, 1.0, "factors", source, f"{field}.law")
-    return 0.0, (len(w) - 1) / (w[-1] - w[0]), np.ascontiguousarray(values[0])
+    return 0.0, (len(w) - 1) / (w[-1] - w[0]), np.array(values[0])  # one to write to: kernels know no other type
 
 
 def _needs(spec, keys, source, field):
