@@ -190,3 +190,47 @@ def test_rail_head_that_is_a_wide_circle_is_read():
     u = np.linspace(-0.15, 0.15, 601)
     profile = ProfileCurve.from_points(u, np.sqrt(0.3**2 - u**2) - 0.3, "rail", "circle")
     assert abs(float(profile(0.1)) - (np.sqrt(0.3**2 - 0.01) - 0.3)) < 1e-6
+
+
+@pytest.mark.parametrize("name", RAIL_HEADS)
+@pytest.mark.parametrize("end", [0.002, 0.008])
+def test_half_rail_head_without_gauge_side_is_told(tmp_path, name, end, capsys):
+    head = named_profile(name, "rail", 1 / 40)
+    u = np.arange(head.u[0] + 1e-4, end, 1e-4)
+    path = written(tmp_path, u, head(u), TURNS["u"])
+    read_profile(str(path), "rail")
+    assert "half a rail head, without its gauge side" in (said := capsys.readouterr().err) and "mirrored: true" in said
+    other = path.rename(tmp_path / "other.csv")
+    assert is_read(other, "rail", u, head(u), mirrored=True)
+    read_profile({"points": str(other), "mirrored": False}, "rail")
+    assert "half a rail head" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("unit", "size"), [("cm", 1e2), ("um", 1e6)])
+@pytest.mark.parametrize("kind", ["wheel", "rail"])
+def test_unit_of_a_file_in_cm_or_um_is_guessed_and_read(tmp_path, kind, unit, size, capsys):
+    curve = S1002 if kind == "wheel" else named_profile("60E1", "rail", 0)
+    path = tmp_path / "profile.txt"
+    np.savetxt(path, size * np.column_stack([curve.u, curve.f])[5:-5:3], fmt="%.7g")
+    with pytest.raises(InputError, match=rf"unit: expected .*, as of {unit}$"):
+        read_profile(str(path), kind)
+    found = read_profile({"points": str(path), "unit": unit}, kind)
+    u = curve.u[40:-40]
+    assert np.abs(found(u) - curve(u)).max() < 5e-6
+    named = path.read_text().replace(" ", ",")
+    path.write_text(f"u_{unit},f_{unit}\n{named}")
+    assert np.array_equal(read_profile(str(path), kind)(u), found(u))
+
+
+@pytest.mark.parametrize("kind", ["wheel", "rail"])
+def test_profile_in_cm_that_is_read_in_mm_is_told(tmp_path, kind, capsys):
+    curve = S1002 if kind == "wheel" else named_profile("60E1", "rail", 0)
+    path = tmp_path / "profile.csv"
+    np.savetxt(path, 1e2 * np.column_stack([curve.u, curve.f])[5:-5:3], fmt="%.6f", delimiter=",", header="u_mm,f_mm",
+               comments="")  # fmt: skip
+    try:
+        read_profile(str(path), kind)
+    except InputError as error:
+        assert "\n" not in str(error)
+    told = rf"a {kind} only \S+ mm wide; if its numbers are in cm: u_cm,f_cm in the header"
+    assert re.search(told, capsys.readouterr().err)

@@ -65,7 +65,7 @@ def add_pair(command, slices=""):
     what = "profile: a name ('wrcore profiles'), a file of points, or '{points: FILE, ...}'"
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help=what)
     command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what + slices)
-    command.add_argument("--unit", choices=("m", "mm", "inch"), help="of profile files that do not state it")
+    command.add_argument("--unit", choices=("m", "mm", "inch", "cm", "um"), help="of files that do not state it")
     command.add_argument("--smoothing", type=float, metavar="m", help="noise of a file's points to even out, m")
     command.add_argument(
         "--inclination", metavar="1/40", help="of a rail, named (0: upright) or {..., inclined: false}"

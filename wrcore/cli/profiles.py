@@ -21,7 +21,7 @@ def add(commands):
     )
     command.add_argument("file", nargs="?", metavar="FILE", help="of points: CSV, SIMPACK, MiniProf, Vampire")
     command.add_argument("--kind", choices=("wheel", "rail"), help="of a file whose ending does not say it")
-    command.add_argument("--unit", choices=("m", "mm", "inch"), help="of files that do not state it")
+    command.add_argument("--unit", choices=("m", "mm", "inch", "cm", "um"), help="of files that do not state it")
     command.add_argument("--smoothing", type=float, metavar="m", help="noise of the points to even out, m")
     command.add_argument("--inclination", metavar="1/40", help="of a rail whose points are upright (inclined: false)")
     command.add_argument("--out", metavar="FILE", help="picture of it, .svg or .png")

@@ -63,14 +63,9 @@ The second one is sought within this distance, in these steps, m. S1002 on 60E1 
 
 
 @jit(allocates=False)
-def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
-    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
-    within ``Z_RANGE`` of ``nominal`` does."""
-    low, high = nominal - Z_RANGE, nominal + Z_RANGE
-    if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
-        return np.nan
-    if wheel_at_rest(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, reduction, patches)[1] > load:
-        return np.nan
+def _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, low, high, patches):
+    """Height (m) at which one wheel carries ``load`` (N), by bisection to rounding: it carries more at ``low`` and less
+    at ``high``."""
     while high - low > 1e-14:
         middle = 0.5 * (low + high)
         if middle == low or middle == high:
@@ -80,6 +75,18 @@ def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
         else:
             high = middle
     return low
+
+
+@jit(allocates=False)
+def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
+    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
+    within ``Z_RANGE`` of ``nominal`` does."""
+    low, high = nominal - Z_RANGE, nominal + Z_RANGE
+    if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
+        return np.nan
+    if wheel_at_rest(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, reduction, patches)[1] > load:
+        return np.nan
+    return _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, low, high, patches)
 
 
 @jit(allocates=False)
@@ -135,15 +142,7 @@ def _branch_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
             break
     if np.isnan(low) or np.isnan(high):
         return near
-    while high - low > 1e-14:
-        middle = 0.5 * (low + high)
-        if middle == low or middle == high:
-            break
-        if wheel_at_rest(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, reduction, patches)[1] > load:
-            low = middle
-        else:
-            high = middle
-    return low
+    return _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, low, high, patches)
 
 
 @jit(allocates=False)

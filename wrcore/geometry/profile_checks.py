@@ -10,11 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.kernels.cache import warn
 
 LARGEST, SMALLEST = 1.0, 5e-3
 """Profiles are neither wider nor narrower than this, m."""
 
-_UNITS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
+UNITS = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 1e-2, "um": 1e-6}
+"""m per unit of a profile file; of two units that fit, the first one is guessed."""
+
+_NARROW = 0.02  # m; narrower ones are scaled, parts, or files in cm that were read in mm
 _WIDTHS = {"wheel": (0.05, 0.18), "rail": (0.03, 0.1)}  # m, of files in the right unit
 _TREAD = 0.35  # the tread, and a rail's head, is the widest part that is less steep
 _ON_TREAD = 0.5  # slope at the tape circle of a wheel; flanks have 1 and more
@@ -25,6 +29,7 @@ _VERTICAL = 6.0  # slope of 80 degrees: flanges of wheels have 70 to 76, sides o
 _STEP = 5e-4  # m
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 _SIDES = 12e-3, 8e-3  # m below a rail's top: its sides, and the least depth that shows them
+_OPEN = 4e-3  # m; half a head falls less than this at its open end
 _STEEP = 0.7  # slope; sides of rails and flanges of wheels are steeper, a circle of 300 mm reaches it at 172 mm
 _BESIDE, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
 _OUTWARD = (
@@ -50,21 +55,30 @@ class Mends(NamedTuple):
     """Whether the direction of u is."""
 
 
+def likely_unit(span, kind):
+    """Unit in which numbers that span so much across are a wheel or a rail; None if there is none."""
+    low, high = _WIDTHS[kind]
+    return next((unit for unit, factor in UNITS.items() if low <= span * factor <= high), None)
+
+
 def check_extent(u, f, kind, name, mends):
     """Refuse points (m) wider or higher than `LARGEST` or narrower than `SMALLEST`; the message names the unit in which
     they would be a ``kind``."""
     width, height = np.ptp(u), np.ptp(f)
     if width >= SMALLEST and max(width, height) <= LARGEST:
+        if width < _NARROW and likely_unit(width / mends.factor, kind) == "cm":
+            mend = mends.unit.format("cm")
+            warn(f"{name}: a {kind} only {1e3 * width:.3g} mm wide; if its numbers are in cm: {mend}")
         return
-    raw = width / mends.factor
     low, high = _WIDTHS[kind]
-    likely = next((unit for unit, factor in _UNITS.items() if low <= raw * factor <= high), None)
+    raw = width / mends.factor
+    likely = likely_unit(raw, kind)
     expected = f"expected a profile 5 mm to 1 m wide, got numbers that span {raw:.4g}"
     expected += f" and {height / mends.factor:.4g}" if height > LARGEST else ""
     if likely:
         raise InputError(name, "unit", f"{expected}; looks like {likely}: {mends.unit.format(likely)}")
     raise InputError(
-        name, "unit", f"{expected}: in none of mm, m, inch a {kind} {1e3 * low:g} to {1e3 * high:g} mm wide"
+        name, "unit", f"{expected}: in none of {', '.join(UNITS)} a {kind} {1e3 * low:g} to {1e3 * high:g} mm wide"
     )
 
 
@@ -119,7 +133,10 @@ def check_rail(u, f, name, mends):
         mend = mends.f if low not in (0, f.size - 1) else "a wheel's points may stand here"
         expected = "expected a rail head with f positive up, got its highest point at an end"
         raise InputError(name, "points", f"{expected}: {mend}")
-    depth = min(f[top] - f[:top].min(), f[top] - f[top:].min(), _SIDES[0])
+    inner, outer = f[top] - f[:top].min(), f[top] - f[top:].min()
+    depth = min(inner, outer, _SIDES[0])
+    if not (mends.is_stated or mends.is_side_stated) and inner < _OPEN and outer >= _SIDES[1]:
+        warn(f"{name}: half a rail head, without its gauge side (negative u); where that is the side: {mends.u}")
     if mends.is_side_stated or depth < _SIDES[1]:
         return
     left, right = (_side(u, f, top, step, depth) for step in (-1, 1))

@@ -22,11 +22,10 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.column_files import read_column_file, read_text, split_unit
 from wrcore.geometry import profile_meters
 from wrcore.geometry.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
-from wrcore.geometry.profile_checks import Mends, check_extent
+from wrcore.geometry.profile_checks import UNITS, Mends, check_extent, likely_unit
 from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated
 from wrcore.kernels.cache import warn
 
-_UNITS = {"m": 1.0, "mm": 1e-3, "inch": 0.0254}
 _SIMPACK = (".prw", ".prr")
 POINT_FILES = (".csv", ".dat", ".txt", *_SIMPACK, *METER_FILES, *VAMPIRE_FILES)
 """Endings of files of points."""
@@ -47,11 +46,11 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     """ProfileCurve of a ``kind`` from the path of a point file, or from a dict of ``points`` (the path) and how to read
     it; its ``source`` says what was read, turned and left out.
 
-    Keys: ``unit`` (m, mm or inch); ``inclined`` (default True): a rail's points lie in the track pose already, else
-    ``inclination`` turns them; ``smoothing`` (m); ``within`` (m, 2): abscissae, as the file has them, between which
-    points are read. What a SIMPACK file states itself: ``mirrored``: the first column counts towards the track's
-    centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that. Where a wheel's
-    u = 0 is: ``tape_circle`` (m), its distance from the file's origin, or ``flange_back`` (m), its distance from the
+    Keys: ``unit`` (m, mm, inch, cm or um); ``inclined`` (default True): a rail's points lie in the track pose already,
+    else ``inclination`` turns them; ``smoothing`` (m); ``within`` (m, 2): abscissae, as the file has them, between
+    which points are read. What a SIMPACK file states itself: ``mirrored``: the first column counts towards the track's
+    centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that. Where a wheel's u
+    = 0 is: ``tape_circle`` (m), its distance from the file's origin, or ``flange_back`` (m), its distance from the
     innermost point. ``part``: of a MiniProf file of several; ``side`` (left or right) of a Vampire file."""
     spec = spec if isinstance(spec, dict) else {"points": spec}
     u, f, lines, inside, stated, told, assumed = read_points(spec, kind)
@@ -95,7 +94,7 @@ def _read(path, text, spec, kind):
     ending, unit = path.suffix.lower(), spec.get("unit")
     origin = "tape_circle, flange_back or shift says where it is"
     shape = "state mirrored and downwards, true or false"
-    mends = Mends("", "", origin, "declare unit: {}", shape, _UNITS[unit or "mm"])
+    mends = Mends("", "", origin, "declare unit: {}", shape, UNITS[unit or "mm"])
     if ending not in _SIMPACK and kind_of(path) not in (kind, None):
         raise InputError(path, "", f"expected a {kind} profile, got a {kind_of(path)}")
     if ending in _SIMPACK:
@@ -110,11 +109,11 @@ def _read(path, text, spec, kind):
     elif ending in VAMPIRE_FILES:
         u, f, lines, stated = profile_meters.read_vampire(path, text, kind, spec.get("side", "right"))
     elif profile_meters.is_meter_file(path, text):
-        u, f, lines, stated = profile_meters.read_meter(path, text, kind, _UNITS[unit or "mm"], spec.get("part"))
+        u, f, lines, stated = profile_meters.read_meter(path, text, kind, UNITS[unit or "mm"], spec.get("part"))
     else:
-        u, f, lines, unit, headed = read_columns(path, text, unit)
+        u, f, lines, unit, headed = read_columns(path, text, kind, unit)
         advice = "u_{0},f_{0} in the header" if headed else "declare unit: {}"
-        mends = mends._replace(unit=advice, factor=_UNITS[unit])
+        mends = mends._replace(unit=advice, factor=UNITS[unit])
         stated = Stated("columns", trimmed=False)
     for key, form in (("part", "MiniProf"), ("side", "Vampire")):
         if key in spec and not stated.about.startswith(form):
@@ -193,8 +192,8 @@ def _checked(spec, kind):
         raise InputError(kind, unknown[0], one_of(sorted(_KEYS), unknown[0]))
     if not isinstance(spec.get("points"), (str, Path)):
         raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
-    if spec.get("unit") not in (None, *_UNITS):
-        raise InputError(kind, "unit", f"expected m, mm or inch, got {spec['unit']!r}")
+    if spec.get("unit") not in (None, *UNITS):
+        raise InputError(kind, "unit", one_of(UNITS, spec["unit"]))
     if "inclined" in spec and kind == "wheel":
         raise InputError(kind, "inclined", "expected this of rails only: leave it out")
     for key in ("inclined", "mirrored", "downwards"):
@@ -237,7 +236,7 @@ def _is_distance(value):
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1.0
 
 
-def read_columns(path, text, unit=None):
+def read_columns(path, text, kind, unit=None):
     """Points u, f (n,) in m of a file of columns, the line number of each, the unit, and whether a header
     states it; it must agree with ``unit``."""
     file = read_column_file(path, text, header=False)
@@ -254,22 +253,22 @@ def read_columns(path, text, unit=None):
     points = file.numbers(columns)
     if unit is None:
         span = np.ptp(points[:, 0]) if points.size else 0.0
-        likely = next((name for name in _UNITS if 0.04 < span * _UNITS[name] < 0.2), None)
+        likely = likely_unit(span, kind)
         guess = f"; u spans {span:g}, as of {likely}" if likely else ""
         raise InputError(
-            path, "unit", f"expected a header u_m,f_m or u_mm,f_mm, or unit: m, mm or inch beside the path{guess}"
+            path, "unit", f"expected a header u_m,f_m or u_mm,f_mm, or unit: {', '.join(UNITS)} beside the path{guess}"
         )
-    u, f = points.T * _UNITS[unit]
+    u, f = points.T * UNITS[unit]
     return u, f, file.lines, unit, headed
 
 
 def _agreed(path, line, stated, declared):
     """The unit that a header states of both columns, or that is declared where it states none."""
-    known = [{"in": "inch", "": declared}.get(unit.lower(), unit.lower()) for unit in stated]
-    if known[0] != known[1] or declared not in (None, known[0]) or known[0] not in (None, *_UNITS):
+    known = [{"in": "inch", "µm": "um", "μm": "um", "": declared}.get(unit.lower(), unit.lower()) for unit in stated]
+    if known[0] != known[1] or declared not in (None, known[0]) or known[0] not in (None, *UNITS):
         got = f"u in {stated[0] or 'no unit'}, f in {stated[1] or 'no unit'}"
         got += f", declared {declared}" if declared else ""
-        raise InputError(path, f"line {line}", f"expected one unit for both columns (m, mm or inch), got {got}")
+        raise InputError(path, f"line {line}", f"expected one unit for both columns ({', '.join(UNITS)}), got {got}")
     return known[0]
 
 

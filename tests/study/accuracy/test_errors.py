@@ -6,6 +6,7 @@ import pytest
 
 from study.accuracy import errors as aa
 from tests.synthetic import hunting_run
+from wrcore.errors import InputError
 from wrcore.scene.description import load_scene
 
 
@@ -74,3 +75,11 @@ def test_failed_choices_are_not_on_the_front():
 def test_recommendation_is_the_cheapest_that_is_accurate_enough():
     chosen = aa.recommendations(table(enumerate([(1.0, 1e-3), (2.0, 1e-4), (4.0, 1e-6)])), [1e-3, 5e-5, 1e-9])
     assert list(zip(chosen["accuracy_m"], chosen["method"], strict=True)) == [(1e-3, "0"), (5e-5, "2")]
+
+
+def test_interpolated_contact_with_another_creep_table_is_refused():
+    choice = aa.Choice("spatial", "tabulated", "table 0.005", "rk23", 1e-4)
+    assert not any("tolerance" in change for change in choice.overrides() if "creep" in change)
+    for creep in ("table 0.01", "she"):
+        with pytest.raises(InputError, match="accuracy: grids.creep: expected table 0.005 with patch tabulated"):
+            choice._replace(creep=creep).overrides()

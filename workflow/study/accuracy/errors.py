@@ -12,6 +12,9 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
+from wrcore.contact.reduction import REDUCTIONS
+from wrcore.creep.table import DEFAULT_TOLERANCE
+from wrcore.errors import InputError
 from wrcore.run.motion import amplitude, hunting_frequency
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
@@ -40,6 +43,11 @@ class Choice(NamedTuple):
             f"integration.rtol={self.rtol:g}",
             "integration.atol=0",
         ]
+        if self.patch not in REDUCTIONS:
+            if law != "table" or (tolerance and float(tolerance) != DEFAULT_TOLERANCE):
+                expected = f"expected table {DEFAULT_TOLERANCE:g} with patch {self.patch}, which reads no other one"
+                raise InputError("accuracy", "grids.creep", f"{expected}, got {self.creep}")
+            return changes
         return [*changes, f"contact.creep.tolerance={tolerance}"] if tolerance else changes
 
 

@@ -36,7 +36,9 @@ def exact_runs(source, overrides, exact, duration):
     rtol = exact["rtol"]
     common = [*overrides, f"integration.duration={duration}", f"integration.method={exact['method']}"]
     common += [f"integration.rtol={rtol:g}", "integration.atol=0"]
-    changes = [[f"{key}={value}" for key, value in exact[name].items()] for name in ("finer", "coarser")]
+    changes = [
+        [f"{key}={value}" for key, value in exact[name].items() if value is not None] for name in ("finer", "coarser")
+    ]
     return tuple(simulate(load_scene(source, [*common, "contact.detection=spatial", *some])) for some in changes)
 
 
