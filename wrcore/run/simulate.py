@@ -21,6 +21,7 @@ from wrcore.integrate.trajectory import Checkpoint
 from wrcore.run.progress import counted, simulated_time
 from wrcore.run.reach import check_reach, warn_of_unreached
 from wrcore.run.run import Run
+from wrcore.run.shape_along import warn_of_shapes
 from wrcore.run.simulation import Simulation
 from wrcore.run.state import State
 from wrcore.scene.description import Scene, Source, load_scene
@@ -83,6 +84,7 @@ def simulate(
         simulation = Simulation(scene, begin_at, show_progress if progress is None else None)
         run = simulation.advance(output_times(begin, settings["duration"], rate), advance)
     warn_of_unreached(scene, simulation.places)
+    warn_of_shapes(scene.source, run.counters, rate)
     return run
 
 

@@ -33,6 +33,7 @@ from wrcore.kernels.aside import compiled_aside
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.run import Run
+from wrcore.run.shape_along import ShapesAlong
 from wrcore.run.state import State, from_state
 from wrcore.run.validity import exceeded, look_up_errors
 from wrcore.scene.description import Scene, compile_scene
@@ -103,6 +104,7 @@ class Simulation:
         )
         self.mark = model_fingerprint(self.model)
         self.start, self._moved = state, 0.0
+        self._shapes = ShapesAlong(scene)
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
         self.arc_lengths = ArcLengths(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
@@ -220,6 +222,7 @@ class Simulation:
         beyond = np.sum(standing[..., 0] > last) if len(extents) else 0
         before = np.sum(standing[..., 0].max(axis=1, initial=-np.inf) < first) if len(extents) else 0
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
+        limits |= self._shapes.counts(patches, standing[..., 0], standing[..., 4])
         limits |= {"before_irregularity": int(before), "beyond_irregularity": int(beyond)}
         return groups, limits | look_up_errors(equations.arguments[1].value.contact, patches)
 

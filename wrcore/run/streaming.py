@@ -32,6 +32,7 @@ from wrcore.run.checkpoints import digest_of
 from wrcore.run.reach import check_reach, warn_of_unreached
 from wrcore.run.results import join_runs, read_part, write_going_on, write_run
 from wrcore.run.run import Run
+from wrcore.run.shape_along import warn_of_shapes
 from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
 from wrcore.run.simulation import ArcLengths, Simulation
 from wrcore.run.validity import LOOK_UP_ERRORS
@@ -122,6 +123,7 @@ def simulate_to(
         if blocks is not None:
             blocks.join(summary)
     warn_of_unreached(scene, simulation.places)
+    warn_of_shapes(scene.source, summary.counters, scene.data["output"]["rate"])
     return summary.run(), interrupts.caught
 
 

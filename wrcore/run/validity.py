@@ -6,6 +6,7 @@ run counts at its output times, not while it is integrated.
 `conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
 `profile_edge`         patches that reach beyond the end of a profile
 `search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
+`not_parabolic`        patches whose gap along the rail is no parabola (`wrcore.run.shape_along`)
 `before_irregularity`  output times at which no wheelset has reached the first sample of the track's irregularity
 `beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
 `hollow_ahead`         patches of a yawed wheel (spatial detection) whose surface there is hollow along the rail
@@ -44,6 +45,7 @@ LIMITS = {
     "search_fallback": "wheels searched strip by strip",
     "hollow_ahead": "patches of wheels too yawed for their hollow",
     "both_flanges": "wheelsets with both flanges on the rails",
+    "not_parabolic": "patches whose surfaces along the rail are no parabola",
     "table_out_of_range": "creep look-ups out of the table's range",
     "step_collapses": "collapses of the step size",
     "rails_unbalanced": "evaluations without a balance of rails without mass",
@@ -61,6 +63,9 @@ MEANINGS = {
     "hollow_ahead": "a patch of a wheel so yawed that its surface there is hollow along the rail: spatial detection "
     "finds no deepest point",
     "both_flanges": "a wheelset that touches with both flanges: it does not fit between the rails",
+    "not_parabolic": "a patch on a wheel out of round, a crossing or a corrugated rail whose gap along the rail leaves "
+    "the parabola of a run by more than 5 % of the penetration: p_max, by up to 35 %, and area are too low there. "
+    "`not_parabolic_WHEELSET_SIDE` counts the output times of each wheel that has any",
     "before_irregularity": "an output time at which no wheelset has reached the first sample of the irregularity",
     "beyond_irregularity": "a wheelset past the last sample of the track's irregularity, on perfect rails again",
     "look_up_normal_error": "largest interpolation error of the normal force in the cells used, relative to it",

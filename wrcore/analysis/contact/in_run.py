@@ -112,8 +112,11 @@ def _lift(found: list[Found], load: float) -> float:
 
 def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:
     """An InputError, of an asker's field, for a scene whose rails or wheels change along the track or the rim."""
-    if any((scene.crossings, scene.out_of_round, scene.corrugation)):
-        raise InputError(asker, field, "expected rails and wheels that are the same everywhere for exact patches")
+    parts = {"track.crossing": scene.crossings, "out_of_round": scene.out_of_round, "corrugation": scene.corrugation}
+    if changing := [name for name, part in parts.items() if part]:
+        expected = f"expected rails and wheels that are the same everywhere for exact patches, got {changing[0]}"
+        use = "'wrcore contact --patch grid' on slices takes the real surfaces where the run counts not_parabolic"
+        raise InputError(asker, field, f"{expected}; {use}")
 
 
 def scene_in_run(run: Run, scene: Source | None, asker: str, trust: bool) -> Scene:
@@ -176,7 +179,8 @@ def patch_in_run(
     ------
     InputError
         For a time beyond the run, a wheel that it does not have, missing channels, another scene than the run's, and
-        rails or wheels that change along the track or the rim.
+        rails or wheels that change along the track or the rim: of these a run counts patches that are no parabola
+        along the rail (``not_parabolic``), and ``wrcore contact --patch grid`` on slices takes the real surfaces.
 
     Examples
     --------

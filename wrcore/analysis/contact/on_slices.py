@@ -12,6 +12,7 @@ from wrcore.contact.strip import make_pose
 from wrcore.dynamics.wheel import ON_FIXED, ON_GRID
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
+from wrcore.run.shape_along import ROUGH
 
 MODELS = ("maximum", "moment", "exact", "grid")
 """Patch models that serve rails which change along the track."""
@@ -19,11 +20,6 @@ MODELS = ("maximum", "moment", "exact", "grid")
 FINER = (2.0, 1.75, 1.5, 1.0, 0.75)
 """Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them. Where no solution is
 found with the first number, the next ones are tried."""
-
-ROUGH = 0.05
-"""Share of its largest penetration by which a patch's gap may leave, on a strip and within its length, the parabola
-that strips know. A wave h cos(pi x/a) on a length 2a is flattened by a pressure pi E* h/(2a), Hertz's largest is
-2 E* d/(pi a): this share moves it by pi^2/4 of itself, 12 %, half a wave on that length by half as much."""
 
 _STATIONS = 81  # over the length of a patch
 
