@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from study.hard_cases import integration
 from study.hard_cases.integration import (
     amplification,
     baumgarte,
@@ -81,3 +82,10 @@ def test_derailing_of_rk4_at_rtol_0_1_is_a_known_limit(vehicles, assert_passed):
     assert derailed == {("rk4", "20 m/s, rtol 0.1")}
     limits = {row["integrator"] for row in found if row["known_limit"]}
     assert limits == {"rk4"}
+
+
+def test_step_limit_excuses_longer_steps_at_low_speed_alone():
+    decaying, growing = np.array([-1.0 + 0.0j]), np.array([2.0 + 0.0j])
+    assert integration.step_limit(0.1, decaying, True) == integration.BOUNDED
+    assert integration.step_limit(0.1, decaying, False) == integration.step_limit(1.0, decaying, True) == ""
+    assert integration.step_limit(80.0, growing, False) == integration.GROWS
