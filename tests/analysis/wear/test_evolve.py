@@ -54,6 +54,7 @@ PLAN = {
 VEHICLE = ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml"
 OFF = {"speed": 140, "integration.duration": 3.0, "initial.y": 0.015}
 """Far above the critical speed."""
+RUN = {"speed": 20, "integration.duration": 0.5}
 ARCHARD = {"archard": {"hardness": 2e9, "coefficients": [[1e-4]]}}
 
 
@@ -338,6 +339,19 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"set": {"initial": {"y": 0.001}}}, "scenes.0.set.initial.y: expected this key here, or in the plan's set"),
         ({"set": {"output.rate": 400}}, "set.output.rate: expected no such key: the plan's key rate"),
+        ({"patches": "exact", "set": {"output.channels": ["pose"]}}, "set.output.channels: expected no such key"),
+        ({"turning": True}, "turning: expected limits beside turning"),
+        ({"limits": {"Sd": 0.034}}, "limits.Sd: expected a limit that the new wheel, 0.032.* has not reached"),
+        ({"limits": {"Sd": 0.022}, "set": {"wheel.profile": "cone:1/40"}}, "limits.Sd: expected no such limit"),
+        ({"set": {"wheel.left.profile": "cone:1/40"}}, "scenes.0.set: expected no wheel.left.profile: all wheels wear"),
+        (
+            {"scenes": [PLAN["scenes"][0], {"share": 1.0, "set": {**RUN, "wheel.profile": "cone:1/40"}}]},
+            "scenes.1.set.wheel.profile: expected the wheel of the first scene",
+        ),
+        (
+            {"set": {"wheel.wheelsets": {"wheelset": {"right": {"profile": "cone:1/40"}}}}},
+            "scenes.0.set: expected no wheel.wheelsets.wheelset.right.profile",
+        ),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
         ({"patches": "strips"}, "patches: expected 'ellipse' or 'exact'"),

@@ -88,12 +88,17 @@ def load_wear_plan(
             raise InputError(name, "begin", f"expected less than the duration of each run, got {data['begin']:g} s")
         check_friction(data["law"], scene.data["contact"]["friction"], name, f"scenes.{i}.set")
         scenes.append(scene)
+    _check_wheels(scenes, name)
+    _check_limits(data, scenes[0].wheel, name)
     return data, scenes
 
 
 def _check_sets(stated, data, name):
     """InputError where the ``set`` that the plan's file states, and that of a scene, have the same key; or where one of
     them has a key that the plan has by another name."""
+    fixed = {"output.rate": "the plan's key rate is the output rate of its runs"}
+    if data["patches"] == "exact":
+        fixed["output.channels"] = "exact patches need channels of their own"
     everywhere = _keys_of_changes(data["set"])
     for i, part in enumerate(data["scenes"]):
         here = _keys_of_changes(part["set"])
@@ -101,13 +106,45 @@ def _check_sets(stated, data, name):
             expected = "expected this key here, or in the plan's set, which holds in all scenes: not in both"
             raise InputError(name, f"scenes.{i}.set.{both[0]}", expected)
         for where, keys in (("set", everywhere), (f"scenes.{i}.set", here)):
-            if "output.rate" in keys:
-                expected = "expected no such key: the plan's key rate is the output rate of its runs"
-                raise InputError(name, f"{where}.output.rate", expected)
+            for key in sorted(keys & fixed.keys()):
+                raise InputError(name, f"{where}.{key}", f"expected no such key: {fixed[key]}")
 
 
 def _keys_of_changes(values):
     return {key for _, key, _ in changes_of(values, {})}
+
+
+def _check_wheels(scenes, name):
+    """InputError where wheels have different profiles: all wear alike, from that of the first scene on."""
+    first = scenes[0].data["wheel"]["profile"]
+    for i, scene in enumerate(scenes):
+        wheel = scene.data["wheel"]
+        single = {f"wheel.wheelsets.{one}": sides for one, sides in wheel.get("wheelsets", {}).items()}
+        for place, sides in {"wheel": wheel, **single}.items():
+            if found := [side for side in SIDES if "profile" in sides.get(side, {})]:
+                expected = f"expected no {place}.{found[0]}.profile: all wheels wear alike, from wheel.profile on"
+                raise InputError(name, f"scenes.{i}.set", expected)
+        if wheel["profile"] != first:
+            expected = "expected the wheel of the first scene, whose profile wears over all scenes: use the plan's set"
+            raise InputError(name, f"scenes.{i}.set.wheel.profile", expected)
+
+
+def _check_limits(data, wheel, name):
+    """InputError for turning without a limit, and for limits that a new wheel has reached or that it cannot reach."""
+    limits = data["limits"]
+    if data["turning"] and not limits:
+        raise InputError(name, "turning", "expected limits beside turning, as a wheel is turned at a limit")
+    if not limits:
+        return
+    new = worn_profiles.flange(wheel) | {"hollow_m": worn_profiles.hollow(points_of(wheel)[1])}
+    for key, limit in limits.items():
+        value = new[f"{key}_m"]
+        if np.isnan(value):
+            expected = f"expected no such limit: the wheel {wheel.name} has no flange where it is measured"
+            raise InputError(name, f"limits.{key}", expected)
+        if worn_profiles.limits_reached({key: limit}, new):
+            expected = f"expected a limit that the new wheel, {value:.6g} m, has not reached, got {limit:g} m"
+            raise InputError(name, f"limits.{key}", expected)
 
 
 @checked
