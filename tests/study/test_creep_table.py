@@ -40,3 +40,9 @@ def test_hard_case_with_another_creep_law_reads_no_table(table):
     vehicles = {"wheelset": {"scene": SCENE, "set": {"contact.patch": "moment"}, "table": table}}
     scene = prepare(vehicles, "wheelset", {"contact.creep.model": "linear"}).scene
     assert "table" not in scene.data["contact"]["creep"]
+
+
+def test_table_that_a_scene_names_is_kept(table, tmp_path):
+    (tmp_path / "another.h5").write_bytes(b"")
+    asked = {"contact.patch": "moment", "contact.creep.table": str(tmp_path / "another.h5")}
+    assert with_creep_table(SCENE, asked, table) == asked

@@ -1,16 +1,16 @@
 """A wheel profile over the distance of a plan: table, figure, and the profiles themselves."""
 
-import os
 import sys
 from pathlib import Path
 
 from study.report.legible import save_figure
+from study.wear.plan_table import plan_with_creep_table
 from wrcore.analysis.pictures.plot_wear import plot_evolution
 from wrcore.analysis.wear.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-plan, changes = snakemake.input.plan, dict(snakemake.params.settings)
-changes["set"] = changes.get("set", {}) | {"contact.creep.table": os.path.abspath(snakemake.input.table[0])}
+plan = snakemake.input.plan
+changes = plan_with_creep_table(plan, dict(snakemake.params.settings), snakemake.input.table[0])
 folder = Path(snakemake.output.table).with_name("profiles") / plan_mark(*load_wear_plan(plan, changes))[:12]
 table = evolve(plan, folder, print, changes, snakemake.threads)  # a job that was killed goes on there
 profiles = profiles_over_distance(folder)

@@ -1,19 +1,19 @@
 """Influences on worn profiles, each variant against the first."""
 
-import os
 import sys
 from pathlib import Path
 
 from study.report.legible import save_figure
 from study.wear.figures import fig_influences
-from study.wear.influences import influence_table, variant_depth
+from study.wear.influences import influence_table, variant_changes, variant_depth
+from study.wear.plan_table import plan_with_creep_table
 from wrcore.analysis.wear.evolve import load_wear_plan, plan_mark
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 plan, settings, found = snakemake.input.plan, snakemake.params.settings, {}
-table = {"contact.creep.table": os.path.abspath(snakemake.input.table[0])}
 for name, variant in settings["variants"].items():
-    changes = {"distance": settings["distance"], **variant.get("plan", {}), "set": variant.get("set", {}) | table}
+    changes = variant_changes(variant, settings["distance"])
+    changes = plan_with_creep_table(plan, changes, snakemake.input.table[0])
     copies = variant.get("copies", 1)
     mark = plan_mark(*load_wear_plan(plan, changes))[:12]
     folder = Path(snakemake.output.table).with_name("influences") / f"{mark}_{copies}"

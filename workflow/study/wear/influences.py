@@ -12,6 +12,14 @@ SEEDS = 100
 """Further copies of a scene have seeds that differ by multiples of this."""
 
 
+def variant_changes(variant, distance):
+    """Changes of a plan over a distance (m) for a variant of the configuration; its ``set`` comes after that of its
+    ``plan``.
+    """
+    changes = {"distance": distance, **variant.get("plan", {})}
+    return changes | {"set": changes.get("set", {}) | variant.get("set", {})}
+
+
 def with_copies(plan, copies):
     """Changes of a plan that put copies of each scene (so many in all) on other irregularities of its kind beside
     it.
