@@ -1,66 +1,16 @@
-"""Every key of wear plans, wear laws, profiles, slice files and the study's configuration is used or refused.
-
-Profiles and slices are read with another value of each key. Plans and the configuration are long to run: a key counts
-as used where the program text that works on them names it.
-"""
-
-import pickle
-import re
-from pathlib import Path
+"""Keys of profiles, slices and crossings, and numbers in files of slices, have an effect or are refused."""
 
 import numpy as np
 import pytest
-import yaml
 
-from tests.scene.test_every_key import leaves
+import wrcore as wr
+from tests.conftest import ELLIPTIC
 from wrcore.errors import InputError
 from wrcore.geometry import profile_files, slice_files
 from wrcore.geometry.profile_files import read_profile
 from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.slices import TURN
 from wrcore.geometry.standards import named_profile
-
-ROOT = Path(__file__).parents[2]
-
-
-def texts(*patterns):
-    return "\n".join(path.read_text() for pattern in patterns for path in sorted(ROOT.glob(pattern)))
-
-
-def is_named(key, text):
-    """Whether a program names a key, as text, as an argument or as a part of a path of keys."""
-    return re.search(rf"(?<![A-Za-z0-9_]){re.escape(key)}(?![A-Za-z0-9_])", text) is not None
-
-
-@pytest.mark.parametrize("schema", ["wear", "wear_law"])
-def test_wear_key_is_read_where_plans_are_worked_on(schema):
-    text = texts("wrcore/analysis/wear/*.py", "wrcore/sweep/*.py")
-    missing = [key for key in leaves(schema) if not is_named(key.rpartition(".")[2].removesuffix("[]"), text)]
-    assert not missing
-
-
-def properties(part):
-    """Names of the keys of a JSON schema, at any depth."""
-    if isinstance(part, dict):
-        if isinstance(part.get("properties"), dict):
-            yield from part["properties"]
-        for inner in part.values():
-            yield from properties(inner)
-    elif isinstance(part, list):
-        for inner in part:
-            yield from properties(inner)
-
-
-BY_LIBRARIES = {"num", "pathvars"}
-"""Keys that go to numpy.linspace and to Snakemake itself."""
-
-
-def test_key_of_the_study_is_read_by_a_rule_or_program():
-    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
-    text = texts("workflow/Snakefile", "workflow/rules/*.smk", "workflow/scripts/**/*.py", "workflow/study/**/*.py")
-    text += texts("wrcore/**/*.py")  # settings that are passed on by their names
-    found = set(properties(schema))
-    assert len(found) > 100
-    assert {key for key in found if not is_named(key, text)} == BY_LIBRARIES
 
 
 def columns(path, kind):
@@ -119,21 +69,84 @@ def test_each_key_of_slices_has_a_case_here():
     assert set(SLICE_KEYS) == slice_files._KEYS - {"slices"}
 
 
-@pytest.mark.parametrize("key", SLICE_KEYS)
-def test_key_of_slices_changes_the_surface_or_is_refused(key, tmp_path):
+ENDINGS = {"rail": "slcs", "wheel": "slcw"}
+PLACES = {"rail": np.arange(12) * 0.1, "wheel": np.arange(12) * TURN / 12}
+"""Of slices, m or rad."""
+
+
+def sections(folder, kind, sign=1.0):
+    """Write two sections in mm, ordinates times a sign: a.txt, and b.txt with a groove."""
+    curve = named_profile("S1002", "wheel") if kind == "wheel" else named_profile("60E1", "rail", 0)
     for name, drop in (("a", 0.0), ("b", 2e-4)):
-        curve = named_profile("60E1", "rail", 0)
-        f = curve.f - drop * np.exp(-((curve.u / 0.005) ** 2))
-        np.savetxt(tmp_path / f"{name}.txt", 1e3 * np.column_stack([curve.u, f])[::4])
-    rows = "".join(f"{s:.2f},{'b' if k == 5 else 'a'}.txt\n" for k, s in enumerate(np.arange(12) * 0.1))
-    (tmp_path / "slices.csv").write_text(f"s_m,profile\n{rows}")
-    plain = {"slices": str(tmp_path / "slices.csv"), "unit": "mm"}
+        f = curve.f - drop * np.exp(-(((curve.u - 0.004) / 0.005) ** 2))
+        np.savetxt(folder / f"{name}.txt", 1e3 * np.column_stack([curve.u, sign * f])[::4])
 
-    def surface(spec):
-        return pickle.dumps(read_slices(spec, "rail"))
 
-    before = surface(plain)
+def table_of_slices(folder, kind, places=None, grooved=5, cut=20.0):
+    """Path of a table of slices whose section is b.txt at one place, with a feature line at a chord length (mm)."""
+    rows = [f"{place:.6f},{'b' if k == grooved else 'a'}.txt,{1e-3 * cut:.6f}"
+            for k, place in enumerate(PLACES[kind] if places is None else places)]  # fmt: skip
+    column = "s_m" if kind == "rail" else "angle_rad"
+    (folder / "slices.csv").write_text("\n".join([f"{column},profile,cut_1_m", *rows]) + "\n")
+    return str(folder / "slices.csv")
+
+
+def surface(spec, kind):
+    """Heights of a rail or wheel of slices between the slices, NaN where there is none."""
+    u = np.linspace(-0.02, 0.03, 51)
+    return read_slices(spec, kind).heights(PLACES[kind][:-1] + 0.3 * PLACES[kind][1], u)[0].tobytes()
+
+
+def changes_or_is_refused(before, spec, kind):
     try:
-        assert surface(plain | {key: SLICE_KEYS[key]}) != before
+        assert surface(spec, kind) != before
     except InputError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("kind", ENDINGS)
+@pytest.mark.parametrize("key", SLICE_KEYS)
+def test_key_of_slices_changes_the_surface_or_is_refused(key, kind, tmp_path):
+    sections(tmp_path, kind)
+    plain = {"slices": table_of_slices(tmp_path, kind), "unit": "mm"}
+    changes_or_is_refused(surface(plain, kind), plain | {key: SLICE_KEYS[key]}, kind)
+
+
+@pytest.mark.parametrize("kind", ENDINGS)
+@pytest.mark.parametrize("change", ["places", "grooved", "cut"])
+def test_column_of_slices_changes_the_surface(change, kind, tmp_path):
+    sections(tmp_path, kind)
+    value = {"places": 0.99 * PLACES[kind], "grooved": 6, "cut": 30.0}[change]
+    before = surface({"slices": table_of_slices(tmp_path, kind), "unit": "mm"}, kind)
+    other = table_of_slices(tmp_path, kind, **{change: value})
+    assert surface({"slices": other, "unit": "mm"}, kind) != before
+
+
+def contact_file(folder, kind, offset=0.0, scale=1.0, method=1, stretch=1.0, grooved=5, cut=20.0):
+    """Path of CONTACT's file of slices, with a feature line at a chord length (mm)."""
+    places = (1e3 if kind == "rail" else 1.0) * stretch * PLACES[kind]
+    lines = [f"{offset} {scale}", f"{places.size}", "3 0 0", f"{method}"]
+    lines += [f"{place:.6f} '{'b' if k == grooved else 'a'}.txt'" for k, place in enumerate(places)]
+    lines += [f"{place:.6f} 0.0 {cut} 999.0" for place in places]
+    (folder / f"slices.{ENDINGS[kind]}").write_text("\n".join(lines) + "\n")
+    return str(folder / f"slices.{ENDINGS[kind]}")
+
+
+NUMBERS = [(kind, *one) for kind in ENDINGS for one in (("offset", 0.05), ("stretch", 0.99), ("grooved", 6),
+                                                        ("cut", 30.0))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "number", "value"), [*NUMBERS, ("rail", "scale", 1.01), ("wheel", "method", 2)])
+def test_number_of_a_contact_file_changes_the_surface(kind, number, value, tmp_path):
+    sections(tmp_path, kind, -1.0)
+    before = surface(contact_file(tmp_path, kind), kind)
+    assert surface(contact_file(tmp_path, kind, **{number: value}), kind) != before
+
+
+@pytest.mark.parametrize("key", SLICE_KEYS)
+@pytest.mark.parametrize("slices", ["crossing:1/12", "switch:500", "joint:0.01"])
+def test_key_beside_a_crossing_by_formula_is_refused(key, slices):
+    crossing = {"slices": {"slices": slices, key: SLICE_KEYS[key]}, "at": 9.0, "rail": "right"}
+    changes = {"rail": {"profile": "60E1", "inclination": 0}, "track.crossing": crossing}
+    with pytest.raises(InputError, match=f"track.crossing.slices.{key}: expected no such key beside {slices}, made by"):
+        wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes)

@@ -120,17 +120,19 @@ MADE = {
 
 
 def _slices(spec, folder, source, field) -> RailSlices:
-    alone = spec["slices"] if isinstance(spec, dict) and list(spec) == ["slices"] else spec
-    kind, colon, value = alone.partition(":") if isinstance(alone, str) else ("", "", "")
+    how = spec if isinstance(spec, dict) else {"slices": spec}
+    named = how.get("slices")
+    kind, colon, value = named.partition(":") if isinstance(named, str) else ("", "", "")
     if colon and kind in MADE:
+        if others := sorted(map(str, how.keys() - {"slices"})):
+            raise InputError(source, f"{field}.{others[0]}", f"expected no such key beside {named}, made by a formula")
         made, low, high, expected = MADE[kind]
         if not low <= (size := parse_ratio(value)) <= high:
             raise InputError(source, field, f"expected {expected}, got {spec!r}")
         return made(size).rail(f"{kind}:{value}")
-    how = spec if isinstance(spec, dict) else {"slices": spec}
-    if not isinstance(how.get("slices"), str):
+    if not isinstance(named, str):
         raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
-    path = find_file(how["slices"], folder, source, field)
+    path = find_file(named, folder, source, field)
     return read_slices({**how, "slices": str(path)}, described_by=f"{source}: {field}")
 
 
