@@ -327,9 +327,9 @@ def names(tmp_path_factory):
 
 
 STATE = ("initial.", "integration.", "output.")
-ROUND_KEY, BAUMGARTE = ".out_of_round.", "integration.baumgarte."
-PITCH = "initial.bodies.*.pitch"
-"""Of bodies that do not spin: `tests/balance/test_bodies.py`."""
+ROUND_KEY = ".out_of_round."
+WITH_BOXES = {"parameters": read_yaml(VEHICLES / "trailer_vehicle.yaml"), "axle_boxes": True}
+"""A vehicle whose bodies pitch."""
 
 ELSEWHERE = {"track", *(f"vehicle.{key}" for key in ("parameters", "axle_boxes", "bodies", "elements", "joints"))}
 """Keys of other schemas, or of the vehicle's test."""
@@ -358,13 +358,33 @@ def test_key_of_a_wheel_out_of_round_changes_its_shape(key, names):
     assert has_effect(key, bases, record, _schema("scene"), special)
 
 
-@pytest.mark.parametrize("key", [key for key in leaves("scene") if key.startswith(STATE) and key != PITCH])
-def test_key_of_the_run_reaches_the_integration(key, names, monkeypatch):
+@pytest.fixture
+def begun(names, monkeypatch):
+    """Function of a scene's changes: what the integration begins with."""
+
+    def stop(model, start, times, *settings, **more):
+        raise Stop(model_fingerprint(model), digest_of((start, times)).hexdigest(), settings[:5], more["most_steps"])
+
+    def record(changes):
+        simulated = simulation.Simulation(load_scene(names["scene"], changes))
+        monkeypatch.setattr(simulation, "integrate", stop)
+        scene = simulated.scene.data
+        times = np.arange(0.0, scene["integration"]["duration"], 1.0 / scene["output"]["rate"])
+        with pytest.raises(Stop) as stopped:
+            simulated.advance(times)
+        return repr(stopped.value.args)
+
+    return record
+
+
+@pytest.mark.parametrize("key", [key for key in leaves("scene") if key.startswith(STATE)])
+def test_key_of_the_run_reaches_the_integration(key, names, begun):
     bases = [
         {"contact.patch": "moment", "initial": {"y": 2e-3, "yaw": 1e-3}},
         {"contact.patch": "moment", "initial": {"bodies": {"wheelset": dict.fromkeys(
             ("x", "y", "z", "roll", "yaw", "vx", "vy", "vz", "wx", "wy", "wz"), 0.0)
             | {"z": 0.46, "vx": 20.0, "wy": 43.0}}}},
+        {"contact.patch": "moment", "vehicle": WITH_BOXES, "initial": {"bodies": {"axle_box_1_left": {"pitch": 0.01}}}},
         {"contact.patch": "moment", "integration": {"duration": 0.02, "method": "rk4", "rtol": 1e-4, "atol": 1e-8,
             "longest_step": 0.01, "most_steps": 1000, "baumgarte": {"alpha": 5.0, "beta": 5.0}}},
         {"contact.patch": "moment", "integration": {"duration": 0.02, "method": "rk4", "step": 1e-4}},
@@ -376,22 +396,19 @@ def test_key_of_the_run_reaches_the_integration(key, names, monkeypatch):
         if key == "output.channels":
             run = simulate(names["scene"], changes, progress=False)
             return [(group, list(run.groups[group])) for group in sorted(run.groups)]
-        simulated = simulation.Simulation(load_scene(names["scene"], changes))
-
-        def stop(model, start, times, *settings, **more):
-            raise Stop(
-                model_fingerprint(model), digest_of((start, times)).hexdigest(), settings[:5], more["most_steps"]
-            )
-
-        monkeypatch.setattr(simulation, "integrate", stop)
-        scene = simulated.scene.data
-        times = np.arange(0.0, scene["integration"]["duration"], 1.0 / scene["output"]["rate"])
-        with pytest.raises(Stop) as stopped:
-            simulated.advance(times)
-        return repr(stopped.value.args)
+        return begun(changes)
 
     special = {"output.channels": [["pose", "contact"]], "integration.method": ["rodas5"]}
     assert has_effect(key, bases, record, _schema("scene"), special)
+
+
+@pytest.mark.parametrize("body", ["car_body", "bogie_1"])
+def test_pitch_of_a_body_reaches_the_integration(body, begun):
+    still, turned = (
+        begun({"contact.patch": "moment", "vehicle": WITH_BOXES, "initial.bodies": {body: {"pitch": pitch}}})
+        for pitch in (0.0, 0.01)
+    )
+    assert still != turned
 
 
 # ------------------------------------------------------------------------------------------------------------ tracks
@@ -452,6 +469,26 @@ def vehicle_bases():
     return [{**trailer, "joints": [*trailer.get("joints", []), turn]}, *found]
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_bodies_of_an_element_decide_where_it_acts(kind):
+    outcomes = []
+    for item in [one for one in [*EVERYTHING, *MORE] if one["kind"] == kind]:
+        base = vehicle_with(item)
+        before = made(base)
+        for bodies in (["lower", "upper"], ["upper", "frame"], ["lower", "frame"]):
+            base["elements"][-1]["bodies"] = bodies
+            try:
+                outcomes.append(made(base) != before)
+            except InputError:  # as of friction whose other element acts between the bodies that were
+                continue
+    assert outcomes and all(outcomes)
+
+
+def test_axle_boxes_change_the_bodies():
+    trailer = read_yaml(VEHICLES / "trailer_vehicle.yaml")
+    assert made(trailer) != made(trailer, axle_boxes=False)
+
+
 VEHICLE_KEYS = [key for key in leaves("vehicle") if not key.startswith("elements[].")]
 
 
@@ -482,8 +519,8 @@ MORE = [
     {"kind": "bump_stop", "direction": "y", "at": [0, 0.2, 1.5], "gap": 0.02, "stiffness": 1e4},
     {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:drag",
      "parameters": [30.0, 5.0], "states": 1},
-    {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0, "preload": 4.0,
-     "gap": 0.01},
+    {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0,
+     "preload": 4.0},
     {"kind": "bushing", "at": [0.2, 0.2, 1.5], "stiffness": [5.0, 2.0, 3.0], "rotation_stiffness": [2.0, 3.0, 4.0],
      "rotation_damping": [1.0, 2.0, 3.0], "preload": [1.0, 2.0, 3.0]},
     {"kind": "anti_roll_bar", "stiffness": 9.0, "damping": 0.4, "at": [0.1, 0.0, 1.0]},
