@@ -53,7 +53,8 @@ def over_wheelsets(title, source, overrides, *, spacing, counts, duration, state
     """
     recorded, runs, rows = [], [], []
     for count in counts:
-        train = [f"vehicle.count={count}", f"vehicle.spacing={spacing}", f"integration.duration={duration}"]
+        train = [f"vehicle.count={count}", f"integration.duration={duration}"]
+        train += [f"vehicle.spacing={spacing}"] if count > 1 else []
         scene = load_scene(source, [*overrides, *train])
         found = record(scene, duration, states)
         start = compile_scene(scene)[1]
