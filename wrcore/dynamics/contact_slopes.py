@@ -49,7 +49,8 @@ def slope_scratch(model):
 def differentiable(contact):
     """Whether `patch_slopes` is all there is to a contact model: no strips, no shape numbers, no rail that leans."""
     shaped = contact.law == TABLE and contact.creep.table.axes.n_psi > 1
-    return not (contact.strips.strips or shaped or changes_along(contact.geometry))
+    solved = contact.strips.strips or len(contact.surrogate.median) > 0
+    return not (solved or shaped or changes_along(contact.geometry))
 
 
 @jit(allocates=False, fastmath=FUSED)

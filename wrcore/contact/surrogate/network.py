@@ -1,0 +1,227 @@
+"""The network of the surrogate: three hidden layers, evaluated in single precision.
+
+Activation x (1 + x / sqrt(x^2 + 4)) / 2: smooth, with a square root in place of an exponential. Inputs are shifted,
+scaled, and compressed by x / (1 + x^2)^(1/4), which grows with the square root of a large input.
+"""
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.special import ellipe, ellipk
+
+from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS
+from wrcore.kernels.jit import FAST, FUSED, jit
+
+N_CORRECTIONS = 8
+"""ln N, ln a, ln b, ln p_max, place along and across the patch over l, contact angle (rad), height over l: what the
+network adds to the contact of a parabolic overlap and to the parabolas of `PatchShape`."""
+
+FORCE_CELLS = 26
+"""Cells, in each direction, of the splines of force modes over the disk of creepages."""
+
+_BASE_RANGE, _BASE_NODES = (-5.0, 4.0), 1024
+"""Range and number of nodes of ln(sigma/l) in the table of parabolic overlaps."""
+
+_WEIGHTS = Path(__file__).with_name("weights.npz")
+
+
+class Surrogate(NamedTuple):
+    """Arrays of a trained network, for kernels; all empty in a scene without it."""
+
+    median: np.ndarray
+    scale: np.ndarray
+    """(N_DESCRIPTORS,) float64: shift and scale of the descriptors."""
+    least: np.ndarray
+    greatest: np.ndarray
+    """(N_DESCRIPTORS,) float64: range of 99.8 % of the training data."""
+    weights_1: np.ndarray
+    biases_1: np.ndarray
+    weights_2: np.ndarray
+    biases_2: np.ndarray
+    weights_3: np.ndarray
+    biases_3: np.ndarray
+    weights_4: np.ndarray
+    biases_4: np.ndarray
+    """(inputs, outputs) and (outputs,) float32 of the layers; the outputs of the last one are the corrections
+    (N_CORRECTIONS) and the coefficients of the force modes."""
+    corrections: np.ndarray
+    """(N_CORRECTIONS,) float64: scales of the corrections."""
+    modes: np.ndarray
+    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes) float32: coefficients of quadratic B-splines of the force modes over
+    the disk of creepages, for Fx and Fy (over friction times N) and Mz (over friction times N times c)."""
+    base: np.ndarray
+    """(nodes, 8) float64: ln N/(E* A l^3), ln a/l, ln b/l, ln p_max/(E* A l) of a parabolic overlap over
+    ln(sigma/l), then their slopes times the step."""
+
+
+class SurrogateWork(NamedTuple):
+    """Scratch arrays of the network."""
+
+    descriptors: np.ndarray
+    """(N_DESCRIPTORS,) float64."""
+    layer: np.ndarray
+    next_layer: np.ndarray
+    """(widest layer,) float32."""
+    outputs: np.ndarray
+    """(outputs,) float32."""
+
+
+def no_surrogate():
+    """`Surrogate` of a scene without it."""
+    single, double = np.zeros(0, np.float32), np.zeros(0)
+    layers = [np.zeros((0, 0), np.float32), single] * 4
+    return Surrogate(double, double, double, double, *layers, double, np.zeros((0,) * 4, np.float32), np.zeros((0, 0)))
+
+
+def surrogate_work(surrogate):
+    """`SurrogateWork` of a `Surrogate`."""
+    width = max(N_DESCRIPTORS, len(surrogate.biases_1))
+    return SurrogateWork(
+        np.zeros(N_DESCRIPTORS), np.zeros(width, np.float32), np.zeros(width, np.float32),
+        np.zeros(len(surrogate.biases_4), np.float32),
+    )  # fmt: skip
+
+
+@cache
+def load_surrogate():
+    """The trained network that comes with the package, see weights.md beside it."""
+    with np.load(_WEIGHTS, allow_pickle=False) as file:
+        z = {name: file[name] for name in file.files}
+    layers = [z[f"{kind}_{k}"] for k in range(1, 5) for kind in ("weights", "biases")]
+    layers = [np.ascontiguousarray(layer, np.float32) for layer in layers]
+    return Surrogate(
+        *(z[name].astype(float) for name in ("median", "scale", "least", "greatest")), *layers,
+        z["corrections"].astype(float), _mode_splines(z), parabolic_overlaps(),
+    )  # fmt: skip
+
+
+def _activation(x):
+    return 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0))
+
+
+def force_modes(z, p, q):
+    """Force modes at places (n,) in the disk of creepages, shape (n, 3, modes), by the network that defines them: the
+    arrays ``z`` with the names mode_weights_k and mode_biases_k."""
+    x = np.stack([2 * p, 2 * q, 2 * p * p, 2 * q * q, 2 * p * q], -1)
+    for k in (1, 2, 3):
+        x = x @ z[f"mode_weights_{k}"].astype(float) + z[f"mode_biases_{k}"]
+        x = _activation(x) if k < 3 else x
+    return x.reshape(len(p), 3, -1) * z["force_scales"].astype(float)[:, None]
+
+
+def _mode_splines(z):
+    """Coefficients of the force modes' quadratic B-splines with equal steps from -1 to 1."""
+    nodes = (np.arange(FORCE_CELLS) + 0.5) * 2.0 / FORCE_CELLS - 1.0  # centres of cells, and both ends
+    nodes = np.concatenate([[-1.0], nodes, [1.0]])
+    p, q = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
+    values = force_modes(z, p, q).reshape(len(nodes), len(nodes), 3, -1)
+    knots = (np.arange(-2, FORCE_CELLS + 3)) * 2.0 / FORCE_CELLS - 1.0
+    along = make_interp_spline(nodes, values, k=2, t=knots, axis=0).c
+    both = make_interp_spline(nodes, np.moveaxis(along, 1, 0), k=2, t=knots, axis=0).c
+    return np.ascontiguousarray(np.moveaxis(both, 0, 1), np.float32)
+
+
+@cache
+def parabolic_overlaps():
+    """``Surrogate.base``: Hertz's contact (Johnson, Contact Mechanics, 4.2) over the form of the parabolic overlap.
+
+    With p_max = E* and b = 1, an ellipse of the axis ratio g has N = 2 pi g/3, the approach minor K(e) and relative
+    curvatures by K(e) and E(e); its overlap -(delta - B s^2) has M0 = 16/15 delta^2 w and sigma = w/sqrt(7) with
+    w^2 = delta/B."""
+    g = np.exp(np.linspace(math.log(1e-3), math.log(1e3), 4001))
+    major, minor = np.maximum(g, 1.0), np.minimum(g, 1.0)
+    square = np.maximum(1.0 - (minor / major) ** 2, 1e-12)
+    k, e = ellipk(square), ellipe(square)
+    factor = minor / (square * major**2)
+    along, across = factor * (k - e), factor * ((major / minor) ** 2 * e - k)
+    circle = square < 1e-3
+    along[circle] = across[circle] = math.pi / 4.0 / major[circle]
+    a, b, depth = np.where(g >= 1.0, along, across), np.where(g >= 1.0, across, along), minor * k
+    half_width = np.sqrt(depth / b)
+    sigma, length = half_width / math.sqrt(7.0), (16.0 / 15.0 * depth**2 * half_width / a**2) ** 0.2
+    x = np.log(sigma / length)
+    order = np.argsort(x)
+    values = np.stack([np.log(2.0 / 3.0 * math.pi * g / (a * length**3)), np.log(g / length), -np.log(length),
+                       -np.log(a * length)], 1)  # fmt: skip
+    spline, nodes = CubicSpline(x[order], values[order]), np.linspace(*_BASE_RANGE, _BASE_NODES)
+    return np.concatenate([spline(nodes), spline(nodes, 1) * (nodes[1] - nodes[0])], 1)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def parabolic_at(base, log_ratio):
+    """ln N/(E* A l^3), ln a/l, ln b/l and ln p_max/(E* A l) of a parabolic overlap at ln(sigma/l), constant beyond the
+    table."""
+    step = (_BASE_RANGE[1] - _BASE_RANGE[0]) / (_BASE_NODES - 1)
+    place = min(max((log_ratio - _BASE_RANGE[0]) / step, 0.0), _BASE_NODES - 1.000001)
+    i = int(place)
+    low, high, t = base[i], base[i + 1], place - i
+    s = 1.0 - t
+    w, d0, d1 = t * t * (3.0 - 2.0 * t), t * s * s, -t * t * s
+    return (
+        low[0] + w * (high[0] - low[0]) + d0 * low[4] + d1 * high[4],
+        low[1] + w * (high[1] - low[1]) + d0 * low[5] + d1 * high[5],
+        low[2] + w * (high[2] - low[2]) + d0 * low[6] + d1 * high[6],
+        low[3] + w * (high[3] - low[3]) + d0 * low[7] + d1 * high[7],
+    )
+
+
+@jit(allocates=False, fastmath=FAST)
+def _dense(inputs, weights, biases, outputs, bend):
+    """One layer; ``bend``: with the activation."""
+    n = weights.shape[1]
+    for j in range(n):
+        outputs[j] = biases[j]
+    for i in range(weights.shape[0]):
+        x, row = inputs[i], weights[i]
+        for j in range(n):
+            outputs[j] += x * row[j]
+    if bend:
+        for j in range(n):
+            x = outputs[j]
+            outputs[j] = np.float32(0.5) * x * (np.float32(1.0) + x / np.sqrt(x * x + np.float32(4.0)))
+
+
+@jit(allocates=False, fastmath=FUSED)
+def run_network(surrogate, work):
+    """Fill ``work.outputs`` from ``work.descriptors``."""
+    for i in range(N_DESCRIPTORS):
+        x = (work.descriptors[i] - surrogate.median[i]) / surrogate.scale[i]
+        work.layer[i] = np.float32(x / math.sqrt(math.sqrt(1.0 + x * x)))
+    _dense(work.layer, surrogate.weights_1, surrogate.biases_1, work.next_layer, True)
+    _dense(work.next_layer, surrogate.weights_2, surrogate.biases_2, work.layer, True)
+    _dense(work.layer, surrogate.weights_3, surrogate.biases_3, work.next_layer, True)
+    _dense(work.next_layer, surrogate.weights_4, surrogate.biases_4, work.outputs, False)
+
+
+@jit(allocates=False, fastmath=FAST)
+def force_remainder(surrogate, outputs, p, q):
+    """Fx, Fy (over friction times N) and Mz (over friction times N times c) that the force modes add at a place in the
+    disk of creepages."""
+    u, v = 0.5 * (p + 1.0) * FORCE_CELLS, 0.5 * (q + 1.0) * FORCE_CELLS
+    i, j = min(max(int(u), 0), FORCE_CELLS - 1), min(max(int(v), 0), FORCE_CELLS - 1)
+    f, g = u - i, v - j
+    fx = fy = mz = np.float32(0.0)
+    for r in range(3):
+        a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
+        for s in range(3):
+            b = 0.5 * (1.0 - g) * (1.0 - g) if s == 0 else 0.5 + g * (1.0 - g) if s == 1 else 0.5 * g * g
+            modes, factor = surrogate.modes[i + r, j + s], np.float32(a * b)
+            x = y = z = np.float32(0.0)
+            for m in range(modes.shape[1]):
+                c = outputs[N_CORRECTIONS + m]
+                x, y, z = x + c * modes[0, m], y + c * modes[1, m], z + c * modes[2, m]
+            fx, fy, mz = fx + factor * x, fy + factor * y, mz + factor * z
+    return float(fx), float(fy), float(mz)
+
+
+@jit(allocates=False)
+def is_outside_training(surrogate, descriptors):
+    """Whether a descriptor lies outside the range of 99.8 % of the training data."""
+    for i in range(N_DESCRIPTORS):
+        if not surrogate.least[i] <= descriptors[i] <= surrogate.greatest[i]:
+            return True
+    return False
