@@ -38,6 +38,18 @@ class Ellipse(NamedTuple):
     """Of its contact angle."""
 
 
+@jit(allocates=False, forceinline=True)
+def ellipse_of(values):
+    """The `Ellipse` of an array (7,)."""
+    return Ellipse(values[0], values[1], values[2], values[3], values[4], values[5], values[6])
+
+
+@jit(allocates=False, forceinline=True)
+def write_ellipse(values, x, y, z, a, b, cosine, sine):
+    """Write the fields of an `Ellipse` into an array (7,)."""
+    values[0], values[1], values[2], values[3], values[4], values[5], values[6] = x, y, z, a, b, cosine, sine
+
+
 @jit(allocates=False, fastmath=FUSED)
 def rise_by_pressure(one, other):
     """Mean of 1/r between two patches (1/m), and its slope across the first one (1/m^2)."""

@@ -16,19 +16,14 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact import reduction
-from wrcore.contact.approach import LEVEL, pressed_together
+from wrcore.contact.approach import pressed_together
 from wrcore.contact.creepage import creepages
-from wrcore.contact.half_space_coupling import Ellipse, rise_by_pressure, slip_by_friction
+from wrcore.contact.half_space_coupling import ellipse_of, rise_by_pressure, slip_by_friction, write_ellipse
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch.gap import add_force, group_end
-from wrcore.contact.strip import make_pose
+from wrcore.contact.strip import lean_at, leaning, make_pose, upright
 from wrcore.contact.surrogate.descriptors import describe, parabola_at
-from wrcore.contact.surrogate.network import (
-    force_remainder,
-    is_outside_training,
-    parabolic_at,
-    run_network,
-)
+from wrcore.contact.surrogate.network import force_remainder, parabolic_at, run_network, trust_in
 from wrcore.contact.surrogate.strips import fill_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.lift import lift_of
@@ -37,7 +32,14 @@ from wrcore.dynamics.motion import WheelMotion, as_left, motion_of
 from wrcore.dynamics.pair_table import APART, DISK, FAR, LOCKED, SADDLE, _at_ellipse, lobe_end
 from wrcore.dynamics.strip_wheel import copy_deepest, mirror
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import OUT_OF_RANGE, OUTSIDE_TRAINING, contact_of, detect_patches, falling
+from wrcore.dynamics.wheel import (
+    OUT_OF_RANGE,
+    OUTSIDE_TRAINING,
+    contact_of,
+    detect_patches,
+    falling,
+    leaning_motion,
+)
 from wrcore.kernels.jit import FUSED, jit
 
 _ONE_PATCH = APART, FAR, SADDLE
@@ -77,11 +79,11 @@ class Pressed(NamedTuple):
     """Where it slips, from the wheelset's centre, m."""
     angle: float
     """Contact angle, rad."""
-    is_outside: bool
-    """Whether a descriptor is outside the range of the training."""
+    trust: float
+    """Share of the network's outputs that counts, 1 in the range of its training."""
 
 
-_NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+_NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Rolled(NamedTuple):
@@ -117,77 +119,100 @@ def mirrored_ahead(m):
     )
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _lifted_wheel(m, lift, rise, tilt, ellipse):
+    """Position of a wheel that the damping lifts, and that the other patches lift by ``rise`` and tilt about the place
+    of this patch: y and z of its centre (m), its axle's z component, and the part of y and z that is due to the tilt.
+    """
+    height, ty, tz = lift.share * lift.depth + rise, tilt * ellipse[2], -tilt * ellipse[1]
+    return m.y - height * lift.sine + ty, m.z + height * lift.cosine + tz, m.ez + tilt, ty, tz
+
+
 @jit(allocates=False, fastmath=FUSED)
-def press_patch(model, m, lift, rows, first, last, rise, tilt, row, work):
-    """`Pressed` of the overlaps from ``first`` to before ``last``, of a wheel that the damping lifts by ``lift`` and
-    other patches by ``rise`` (m), and tilt by ``tilt`` about this patch. ``row`` (PATCH_COLUMNS,) becomes the patch's
-    row, without forces."""
-    geometry, surrogate, network = model.geometry, model.surrogate, work.network
-    low, high = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
+def press_patch(model, m, is_spatial, lean, lift, rows, q, row, work):
+    """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel; ``row``
+    (PATCH_COLUMNS,) becomes its deepest overlap."""
+    geometry, surrogate, network, forces = model.geometry, model.surrogate, work.network, work.forces
+    first, last, tilt = forces.first[q], forces.last[q], forces.tilt[q]
     copy_deepest(rows, first, last, row)
     if lift.share >= 1.0:
         return _NO_CONTACT
-    height, ty, tz = lift.share * lift.depth + rise, tilt * (row[reduction.Z] - m.z), -tilt * (row[reduction.Y] - m.y)
-    y, z = m.y - height * lift.sine + ty, m.z + height * lift.cosine + tz
-    pose = make_pose(1.0, y, z, m.ex, m.ey, m.ez + tilt, True)
+    y, z, ez, ty, tz = _lifted_wheel(m, lift, forces.rise[q], tilt, forces.ellipses[q])
+    pose = make_pose(1.0, y, z, m.ex, m.ey, ez, is_spatial)
+    low, high = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
     count, n = fill_strips(geometry, pose, row, low, high, work.strips)
     friction = max(m.friction, _LEAST_FRICTION)
     shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, network.descriptors)
     if not shape.length > 0.0:
         return _NO_CONTACT
     run_network(surrogate, network)
-    is_outside = is_outside_training(surrogate, network.descriptors)
+    trust = trust_in(surrogate, network.descriptors)
+    for k in range(len(network.outputs)):
+        network.outputs[k] *= trust
     scaled, c = network.outputs, surrogate.corrections
     log_n, log_a, log_b, log_p = parabolic_at(surrogate.base, network.descriptors[0])
-    l, log_l = shape.length, math.log(shape.length)
-    stiffness = contact_modulus(model.shear_modulus, model.poisson_ratio) * shape.curvature * l
-    load = stiffness * l * l * math.exp(log_n + bounded(c[0] * scaled[0], _MOST_LOG_LOAD))
-    log_a = log_l + log_a + bounded(c[1] * scaled[1], _MOST_LOG_AXIS)
-    log_b = log_l + log_b + bounded(c[2] * scaled[2], _MOST_LOG_AXIS)
+    size, log_size = shape.length, math.log(shape.length)
+    stiffness = contact_modulus(model.shear_modulus, model.poisson_ratio) * shape.curvature * size
+    load = stiffness * size * size * math.exp(log_n + bounded(c[0] * scaled[0], _MOST_LOG_LOAD))
+    log_a = log_size + log_a + bounded(c[1] * scaled[1], _MOST_LOG_AXIS)
+    log_b = log_size + log_b + bounded(c[2] * scaled[2], _MOST_LOG_AXIS)
     p_max = stiffness * math.exp(log_p + bounded(c[3] * scaled[3], 2.0 * _MOST_LOG_AXIS))
     b_over_sigma = math.exp(log_b) / shape.sigma
-    e = bounded(c[5] * scaled[5] * l / shape.sigma, _MOST_PLACE)
+    e = bounded(c[5] * scaled[5] * size / shape.sigma, _MOST_PLACE)
     spread = bounded(0.2 * b_over_sigma * b_over_sigma, 2.0 * _MOST_WIDTH)
     angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)
     angle += bounded(c[6] * scaled[6], _MOST_ANGLE) - 0.5 * tilt
-    px = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread) + bounded(c[4] * scaled[4], 1.0) * l
+    px = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread)
+    px += bounded(c[4] * scaled[4], 1.0) * size
     pz = parabola_at(shape.height, shape.height_1, shape.height_2, shape.third, e, spread)
-    pz += bounded(c[7] * scaled[7], 1.0) * l + tz
+    pz += bounded(c[7] * scaled[7], 1.0) * size + tz
     py = shape.lateral + e * shape.sigma * math.cos(shape.angle) + geometry.rail_distance - y + ty
-    return Pressed(load, log_a, log_b, p_max, px, py, pz, angle, is_outside)
+    px, pz = leaning(geometry, lean, px, pz)
+    return Pressed(load, log_a, log_b, p_max, px, py, pz, angle, trust)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
-    """`Rolled` of a patch of a wheel that rolls forward; ``outputs`` are the network's."""
-    geometry, angle = model.geometry, pressed.angle
-    cosine, sine, speed = math.cos(angle), math.sin(angle), max(m.vx, model.least_speed)
+    """`Rolled` of a patch of a wheel that rolls forward; ``outputs`` are the network's.
+
+    Below the least speed spin fades out with the speed, so that nothing jumps where a wheel stops and rolls back."""
+    radius, cosine, sine = model.geometry.rolling_radius, math.cos(pressed.angle), math.sin(pressed.angle)
+    speed = max(m.vx, model.least_speed)
     xi, eta, phi, _ = creepages(
         m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, pressed.px, pressed.py, pressed.pz, cosine, sine, speed
     )
     limit = falling(model, m.friction, xi, eta, speed) * pressed.load
-    x, y = xi + slip_xi, eta + slip_eta
-    f1, f2, m3, missed, c = _at_ellipse(model, pressed.log_a, pressed.log_b, limit, x, y, phi)
+    x, y, forward = xi + slip_xi, eta + slip_eta, min(m.vx / speed, 1.0)
+    f1, f2, m3, missed, c = _at_ellipse(model, pressed.log_a, pressed.log_b, limit, x, y, forward * phi)
+    m3 *= forward
     unit = model.shear_modulus * c * c / (3.0 * limit)
     c11, c22, _, _ = coefficients_at(pressed.log_a - pressed.log_b, model.creep.table.kalker)
     px, py = x * unit * c11, y * unit * c22
     root = 1.0 / (DISK + math.sqrt(DISK * DISK + px * px + py * py))
     r1, r2, r3 = force_remainder(model.surrogate, outputs, px * root, py * root)
-    part = (m.wy * geometry.rolling_radius / speed - 1.0) / LOCKED
+    part = (m.wy * radius / speed - 1.0) / LOCKED
     fade = max(0.0, 1.0 - part * part)
     fade *= fade
-    given, taken = f1 * x + f2 * y + m3 * phi * c, r1 * x + r2 * y + r3 * phi * c
-    if fade * taken > -given:  # no power is produced
-        fade = max(-given, 0.0) / taken
     f1, f2, m3 = f1 + fade * r1, f2 + fade * r2, bounded(m3 + fade * r3, 2.0 * _MOST_MOMENT)
-    scale = limit / max(math.sqrt(f1 * f1 + f2 * f2), 1.0)
-    return Rolled(xi, eta, phi, scale * f1, scale * f2, limit * c * m3, missed)
+    less = 1.0 / max(math.sqrt(f1 * f1 + f2 * f2), 1.0)
+    f1, f2, m3 = without_power(less * f1, less * f2, m3, x, y, phi * c)
+    return Rolled(xi, eta, phi, limit * f1, limit * f2, limit * c * m3, missed)
 
 
-@jit(allocates=False, fastmath=FUSED)
-def _ellipse_of(values):
-    """`Ellipse` of a row of ``PatchForces.ellipses``."""
-    return Ellipse(values[0], values[1], values[2], values[3], values[4], values[5], values[6])
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def without_power(f1, f2, m3, x, y, spin):
+    """Creep force and moment that produce no power in the creepages ``x``, ``y`` and ``spin``.
+
+    Where they would, the moment is reduced first, then the force along the creepages."""
+    of_force, of_moment = f1 * x + f2 * y, m3 * spin
+    if of_force + of_moment > 0.0:
+        if of_moment > 0.0:
+            m3 *= max(-of_force, 0.0) / of_moment
+        excess = of_force - max(-of_moment, 0.0)
+        if excess > 0.0:
+            along = excess / (x * x + y * y)
+            f1, f2 = f1 - along * x, f2 - along * y
+    return f1, f2, m3
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -196,74 +221,96 @@ def _couple(model, count, forces):
     per_load = 1.0 / (math.pi * contact_modulus(model.shear_modulus, model.poisson_ratio))
     per_friction = 1.0 / (math.pi * model.shear_modulus)
     for q in range(count):
-        one = _ellipse_of(forces.ellipses[q])
+        one = ellipse_of(forces.ellipses[q])
         rise = tilt = xi = eta = 0.0
         for r in range(count):
             if r == q or forces.load[r] <= 0.0 or one.a <= 0.0:
                 continue
-            other = _ellipse_of(forces.ellipses[r])
+            other = ellipse_of(forces.ellipses[r])
             value, slope = rise_by_pressure(one, other)
             rise, tilt = rise + per_load * forces.load[r] * value, tilt + per_load * forces.load[r] * slope
             x, y = slip_by_friction(model.poisson_ratio, one, other, forces.fx[r], forces.fy[r], forces.mz[r])
             xi, eta = xi + per_friction * x, eta + per_friction * y
-        if one.a > 0.0:
-            forces.rise[q], forces.tilt[q], forces.slip_xi[q], forces.slip_eta[q] = rise, tilt, xi, eta
+        forces.rise[q], forces.tilt[q], forces.slip_xi[q], forces.slip_eta[q] = rise, tilt, xi, eta
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _find_patches(geometry, pose, rows, first, last, forces):
-    """Number of patches that the overlaps from ``first`` to before ``last`` form; writes where each begins and ends."""
+    """Number of patches that the overlaps from ``first`` to before ``last`` form; writes where each begins and ends,
+    and that nothing presses on them."""
     count = 0
     while first < last:
         end = lobe_end(geometry, pose, rows, first, last, _ONE_PATCH)
         forces.first[count], forces.last[count] = first, end
         forces.rise[count] = forces.tilt[count] = forces.slip_xi[count] = forces.slip_eta[count] = 0.0
-        forces.load[count] = forces.ellipses[count, 3] = 0.0
+        forces.load[count], forces.ellipses[count, :] = 0.0, 0.0
         first, count = end, count + 1
     return count
 
 
 @jit(allocates=False, fastmath=FUSED)
-def group_forces(model, m, rows, first, last, kept, wrench, counters, scratch, work):
+def _fill_row(m, p, r, place, row):
+    """Write a patch into its row of patches; ``place`` (m): x, y, z from the wheelset's centre."""
+    row[reduction.X], row[reduction.Y], row[reduction.Z] = place[0], place[1] + m.y, place[2] + m.z
+    row[reduction.ANGLE], row[reduction.COSINE] = p.angle, math.cos(p.angle)
+    row[reduction.SINE], row[reduction.NORMAL] = math.sin(p.angle), p.load
+    row[reduction.SEMI_A], row[reduction.SEMI_B] = math.exp(p.log_a), math.exp(p.log_b)
+    row[reduction.FX], row[reduction.FY], row[reduction.MZ] = r.fx, r.fy, r.mz
+    row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = r.xi, r.eta, r.phi
+    row[reduction.P_MAX], row[reduction.CELL] = p.p_max, 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_patch(geometry, m, lean, p, r, wrench, row):
+    """Add a patch's force and moment about the wheelset's centre to ``wrench``, and write its ``row``. Place and forces
+    are in axes that ``lean`` as the rail does under the patch."""
+    cosine, sine = math.cos(p.angle), math.sin(p.angle)
+    fy, fz = r.fy * cosine - p.load * sine, r.fy * sine + p.load * cosine
+    px, pz = upright(geometry, lean, p.px, p.pz)
+    fx, fz = upright(geometry, lean, r.fx, fz)
+    mx, mz = upright(geometry, lean, 0.0, r.mz * cosine)
+    add_force(px, p.py, pz, fx, fy, fz, wrench)
+    wrench[3] += mx
+    wrench[4] -= r.mz * sine
+    wrench[5] += mz
+    _fill_row(m, p, r, (px, p.py, pz), row)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, moments, scratch_rows, work):
     """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
-    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten."""
-    geometry, forces, outputs = model.geometry, work.forces, work.network.outputs
-    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True)
-    lift = lift_of(model, m, pressed_together(geometry, pose, True, LEVEL, rows, first, last, scratch.moments))
+    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten. ``moments``
+    (3, 5) and ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) are scratch."""
+    geometry, forces = model.geometry, work.forces
+    pose, deepest = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial), scratch_rows[0]
+    copy_deepest(rows, first, last, deepest)
+    lean = lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
+    moving = leaning_motion(geometry, m, lean)
+    pressed = pressed_together(geometry, pose, is_spatial, lean, rows, first, last, moments)
+    lift = lift_of(model, moving, pressed)
     count = _find_patches(geometry, pose, rows, first, last, forces)
     rounds = 1 if count == 1 else _ROUNDS
     for turn in range(rounds):
         for q in range(count):
-            row = scratch.rows[q]
-            begin, end = forces.first[q], forces.last[q]
-            p = press_patch(model, m, lift, rows, begin, end, forces.rise[q], forces.tilt[q], row, work)
+            p = press_patch(model, m, is_spatial, lean, lift, rows, q, scratch_rows[q], work)
             forces.load[q] = p.load
             if not p.load > 0.0:
                 continue
-            r = roll_patch(model, m, p, forces.slip_xi[q], forces.slip_eta[q], outputs)
-            cosine, sine, a, b = math.cos(p.angle), math.sin(p.angle), math.exp(p.log_a), math.exp(p.log_b)
+            r = roll_patch(model, moving, p, forces.slip_xi[q], forces.slip_eta[q], work.network.outputs)
             forces.fx[q], forces.fy[q], forces.mz[q] = r.fx, r.fy, r.mz
-            values = forces.ellipses[q]
-            values[0], values[1], values[2], values[3], values[4] = p.px, p.py, p.pz, a, b
-            values[5], values[6] = cosine, sine
+            write_ellipse(
+                forces.ellipses[q], p.px, p.py, p.pz, math.exp(p.log_a), math.exp(p.log_b), math.cos(p.angle),
+                math.sin(p.angle),
+            )  # fmt: skip
             if turn == rounds - 1:
                 counters[OUT_OF_RANGE] += r.missed
-                counters[OUTSIDE_TRAINING] += p.is_outside
-                y, z = r.fy * cosine - p.load * sine, r.fy * sine + p.load * cosine
-                add_force(p.px, p.py, p.pz, r.fx, y, z, wrench)
-                wrench[4] -= r.mz * sine
-                wrench[5] += r.mz * cosine
-                row[reduction.X], row[reduction.Y], row[reduction.Z] = p.px, p.py + m.y, p.pz + m.z
-                row[reduction.ANGLE], row[reduction.COSINE], row[reduction.SINE] = p.angle, cosine, sine
-                row[reduction.SEMI_A], row[reduction.SEMI_B], row[reduction.NORMAL] = a, b, p.load
-                row[reduction.FX], row[reduction.FY], row[reduction.MZ] = r.fx, r.fy, r.mz
-                row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = r.xi, r.eta, r.phi
-                row[reduction.P_MAX], row[reduction.CELL] = p.p_max, 0.0
+                counters[OUTSIDE_TRAINING] += p.trust < 1.0
+                _add_patch(geometry, m, lean, p, r, wrench, scratch_rows[q])
         if turn < rounds - 1:
             _couple(model, count, forces)
     for q in range(count):
         if forces.load[q] > 0.0:
-            copy_into(rows[kept], scratch.rows[q])
+            copy_into(rows[kept], scratch_rows[q])
             kept += 1
     return kept
 
@@ -287,14 +334,15 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
             m, rolls_back = as_left(seen), seen.vx < 0.0
             m = mirrored_ahead(m) if rolls_back else m
             wrench[:] = 0.0
-            count, bound, _ = detect_patches(contact, m, rows)
+            count, bound, is_spatial = detect_patches(contact, m, rows)
             if not mode & PATCHES_ONLY:
                 first = kept = 0
                 while first < count:
                     last = group_end(contact.geometry, rows, count, first)
                     kept = group_forces(
-                        contact, m, rows, first, last, kept, wrench, counters, scratch, scratch.surrogate
-                    )
+                        contact, m, is_spatial, rows, first, last, kept, wrench, counters, scratch.moments,
+                        scratch.rows, scratch.surrogate,
+                    )  # fmt: skip
                     first = last
                 count = kept
                 if rolls_back:

@@ -21,8 +21,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
 """Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
-pair's table that were solved instead of looked up, and patches on fixed strips, whose tips were not found, and patches whose shape is outside the
-training of the surrogate."""
+pair's table that were solved instead of looked up, patches on fixed strips, whose tips were not found, and patches of
+the surrogate outside the range of its training."""
 
 COUNTERS = 6
 
@@ -78,9 +78,15 @@ def press_wheels(model, work, mode):
     )  # fmt: skip
 
 
+@jit(allocates=False, forceinline=True)
+def is_elliptic(contact):
+    """Whether the patches of a `ContactModel` are ellipses."""
+    return not contact.strips.strips and len(contact.surrogate.median) == 0
+
+
 def shaped(contact):
     """Whether a `ContactModel` asks for the shape numbers of its patches."""
-    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and not contact.strips.strips
+    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and is_elliptic.py_func(contact)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -21,8 +21,8 @@ from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
-from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, OWN
 from wrcore.dynamics.crossing import no_crossing
 from wrcore.dynamics.marker import FRAME

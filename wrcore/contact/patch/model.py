@@ -19,6 +19,9 @@ from wrcore.errors import InputError, one_of
 PATCHES = ("maximum", "moment", "exact", "tabulated", "surrogate")
 """Patch models by name: two reductions to an ellipse, exact strips, these looked up, and a trained network of them."""
 
+STRIPS = "exact", "tabulated"
+"""Those that solve patches on strips, in a run or before it."""
+
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
 
@@ -143,7 +146,7 @@ def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0
 
 @lru_cache(maxsize=8)
 def _strip_model(patch, resolution, slip, nu, friction):
-    if patch in ("maximum", "moment", "surrogate"):
+    if patch not in STRIPS:
         return StripModel(0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
     level = LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]

@@ -113,7 +113,14 @@ def describe(strips, count, n, rolling_radius, axle_slope, friction, out):
         m3, m4, m5, m6 = m3 + w * cubic, m4 + w * e2 * e2, m5 + w * cubic * e2, m6 + w * cubic * cubic
         changed, x, z = w * (strips.curvature[k] * per_curvature - 1.0), w * (strips.ahead[k] - ahead), 0.0
         z = w * (strips.height[k] - height)
-        a1, a2, x1, x2, z1, z2 = a1 + changed * e, a2 + changed * even, x1 + x * e, x2 + x * even, z1 + z * e, z2 + z * even
+        a1, a2, x1, x2, z1, z2 = (
+            a1 + changed * e,
+            a2 + changed * even,
+            x1 + x * e,
+            x2 + x * even,
+            z1 + z * e,
+            z2 + z * even,
+        )
         c1, c2, c3, c4 = c1 + bent * e, c2 + bent * even, c3 + bent * cubic, c4 + bent * (e2 * e2 - 3.0)
     for j in range(N_DESCRIPTORS):
         out[j] = 0.0
@@ -130,7 +137,12 @@ def describe(strips, count, n, rolling_radius, axle_slope, friction, out):
     out[0] = math.log(sigma / length)
     out[17], out[18], out[19], out[20], out[21], out[22] = m3, m4, m5, m6, a1, a2
     out[23], out[24], out[25] = ahead / rolling_radius, x1 * per_sigma, x2 / length
-    out[26], out[27], out[28], out[29] = angle, axle_slope, math.log(friction), math.sin(angle - axle_slope) * per_friction
+    out[26], out[27], out[28], out[29] = (
+        angle,
+        axle_slope,
+        math.log(friction),
+        math.sin(angle - axle_slope) * per_friction,
+    )
     out[30], out[31], out[32], out[33] = c1, c2, c3, c4
     out[34], out[35], out[36], out[37] = c1 * per_friction, c2 * per_friction, c3 * per_friction, c4 * per_friction
     flatness = 1.0 / max(m4 - 1.0 - m3 * m3, _LEAST_FLATNESS)

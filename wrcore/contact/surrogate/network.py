@@ -1,4 +1,7 @@
-"""The network of the surrogate: three hidden layers, evaluated in single precision.
+"""The network of the surrogate: three hidden layers.
+
+Weights are kept in single precision, and evaluated in double precision: an implicit method takes differences of
+contact forces, which the rounding of single precision would spoil.
 
 Activation x (1 + x / sqrt(x^2 + 4)) / 2: smooth, with a square root in place of an exponential. Inputs are shifted,
 scaled, and compressed by x / (1 + x^2)^(1/4), which grows with the square root of a large input.
@@ -34,10 +37,10 @@ class Surrogate(NamedTuple):
 
     median: np.ndarray
     scale: np.ndarray
-    """(N_DESCRIPTORS,) float64: shift and scale of the descriptors."""
+    """(N_DESCRIPTORS,): shift and scale of the descriptors."""
     least: np.ndarray
     greatest: np.ndarray
-    """(N_DESCRIPTORS,) float64: range of 99.8 % of the training data."""
+    """(N_DESCRIPTORS,): range of 99.8 % of the training data."""
     weights_1: np.ndarray
     biases_1: np.ndarray
     weights_2: np.ndarray
@@ -46,15 +49,15 @@ class Surrogate(NamedTuple):
     biases_3: np.ndarray
     weights_4: np.ndarray
     biases_4: np.ndarray
-    """(inputs, outputs) and (outputs,) float32 of the layers; the outputs of the last one are the corrections
+    """(inputs, outputs) and (outputs,) of the layers; the outputs of the last one are the corrections
     (N_CORRECTIONS) and the coefficients of the force modes."""
     corrections: np.ndarray
-    """(N_CORRECTIONS,) float64: scales of the corrections."""
+    """(N_CORRECTIONS,): scales of the corrections."""
     modes: np.ndarray
-    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes) float32: coefficients of quadratic B-splines of the force modes over
+    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes): coefficients of quadratic B-splines of the force modes over
     the disk of creepages, for Fx and Fy (over friction times N) and Mz (over friction times N times c)."""
     base: np.ndarray
-    """(nodes, 8) float64: ln N/(E* A l^3), ln a/l, ln b/l, ln p_max/(E* A l) of a parabolic overlap over
+    """(nodes, 8): ln N/(E* A l^3), ln a/l, ln b/l, ln p_max/(E* A l) of a parabolic overlap over
     ln(sigma/l), then their slopes times the step."""
 
 
@@ -62,28 +65,24 @@ class SurrogateWork(NamedTuple):
     """Scratch arrays of the network."""
 
     descriptors: np.ndarray
-    """(N_DESCRIPTORS,) float64."""
+    """(N_DESCRIPTORS,)."""
     layer: np.ndarray
     next_layer: np.ndarray
-    """(widest layer,) float32."""
+    """(widest layer,)."""
     outputs: np.ndarray
-    """(outputs,) float32."""
+    """(outputs,)."""
 
 
 def no_surrogate():
     """`Surrogate` of a scene without it."""
-    single, double = np.zeros(0, np.float32), np.zeros(0)
-    layers = [np.zeros((0, 0), np.float32), single] * 4
-    return Surrogate(double, double, double, double, *layers, double, np.zeros((0,) * 4, np.float32), np.zeros((0, 0)))
+    none = np.zeros(0)
+    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4), np.zeros((0, 0)))
 
 
 def surrogate_work(surrogate):
     """`SurrogateWork` of a `Surrogate`."""
     width = max(N_DESCRIPTORS, len(surrogate.biases_1))
-    return SurrogateWork(
-        np.zeros(N_DESCRIPTORS), np.zeros(width, np.float32), np.zeros(width, np.float32),
-        np.zeros(len(surrogate.biases_4), np.float32),
-    )  # fmt: skip
+    return SurrogateWork(np.zeros(N_DESCRIPTORS), np.zeros(width), np.zeros(width), np.zeros(len(surrogate.biases_4)))
 
 
 @cache
@@ -92,7 +91,7 @@ def load_surrogate():
     with np.load(_WEIGHTS, allow_pickle=False) as file:
         z = {name: file[name] for name in file.files}
     layers = [z[f"{kind}_{k}"] for k in range(1, 5) for kind in ("weights", "biases")]
-    layers = [np.ascontiguousarray(layer, np.float32) for layer in layers]
+    layers = [np.ascontiguousarray(layer, float) for layer in layers]
     return Surrogate(
         *(z[name].astype(float) for name in ("median", "scale", "least", "greatest")), *layers,
         z["corrections"].astype(float), _mode_splines(z), parabolic_overlaps(),
@@ -122,7 +121,7 @@ def _mode_splines(z):
     knots = (np.arange(-2, FORCE_CELLS + 3)) * 2.0 / FORCE_CELLS - 1.0
     along = make_interp_spline(nodes, values, k=2, t=knots, axis=0).c
     both = make_interp_spline(nodes, np.moveaxis(along, 1, 0), k=2, t=knots, axis=0).c
-    return np.ascontiguousarray(np.moveaxis(both, 0, 1), np.float32)
+    return np.ascontiguousarray(np.moveaxis(both, 0, 1))
 
 
 @cache
@@ -182,7 +181,7 @@ def _dense(inputs, weights, biases, outputs, bend):
     if bend:
         for j in range(n):
             x = outputs[j]
-            outputs[j] = np.float32(0.5) * x * (np.float32(1.0) + x / np.sqrt(x * x + np.float32(4.0)))
+            outputs[j] = 0.5 * x * (1.0 + x / math.sqrt(x * x + 4.0))
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -190,7 +189,7 @@ def run_network(surrogate, work):
     """Fill ``work.outputs`` from ``work.descriptors``."""
     for i in range(N_DESCRIPTORS):
         x = (work.descriptors[i] - surrogate.median[i]) / surrogate.scale[i]
-        work.layer[i] = np.float32(x / math.sqrt(math.sqrt(1.0 + x * x)))
+        work.layer[i] = x / math.sqrt(math.sqrt(1.0 + x * x))
     _dense(work.layer, surrogate.weights_1, surrogate.biases_1, work.next_layer, True)
     _dense(work.next_layer, surrogate.weights_2, surrogate.biases_2, work.layer, True)
     _dense(work.layer, surrogate.weights_3, surrogate.biases_3, work.next_layer, True)
@@ -204,24 +203,29 @@ def force_remainder(surrogate, outputs, p, q):
     u, v = 0.5 * (p + 1.0) * FORCE_CELLS, 0.5 * (q + 1.0) * FORCE_CELLS
     i, j = min(max(int(u), 0), FORCE_CELLS - 1), min(max(int(v), 0), FORCE_CELLS - 1)
     f, g = u - i, v - j
-    fx = fy = mz = np.float32(0.0)
+    fx = fy = mz = 0.0
     for r in range(3):
         a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
         for s in range(3):
             b = 0.5 * (1.0 - g) * (1.0 - g) if s == 0 else 0.5 + g * (1.0 - g) if s == 1 else 0.5 * g * g
-            modes, factor = surrogate.modes[i + r, j + s], np.float32(a * b)
-            x = y = z = np.float32(0.0)
+            modes, factor = surrogate.modes[i + r, j + s], a * b
+            x = y = z = 0.0
             for m in range(modes.shape[1]):
                 c = outputs[N_CORRECTIONS + m]
                 x, y, z = x + c * modes[0, m], y + c * modes[1, m], z + c * modes[2, m]
             fx, fy, mz = fx + factor * x, fy + factor * y, mz + factor * z
-    return float(fx), float(fy), float(mz)
+    return fx, fy, mz
 
 
-@jit(allocates=False)
-def is_outside_training(surrogate, descriptors):
-    """Whether a descriptor lies outside the range of 99.8 % of the training data."""
+@jit(allocates=False, fastmath=FUSED)
+def trust_in(surrogate, descriptors):
+    """Share of the network's outputs that counts: 1 in the range of the training, falling smoothly to 0 beyond it.
+
+    Each descriptor counts by the square of how far it is outside, over the width of its range."""
+    outside = 0.0
     for i in range(N_DESCRIPTORS):
-        if not surrogate.least[i] <= descriptors[i] <= surrogate.greatest[i]:
-            return True
-    return False
+        least, greatest = surrogate.least[i], surrogate.greatest[i]
+        excess = max(least - descriptors[i], descriptors[i] - greatest, 0.0) / (greatest - least)
+        outside += excess * excess
+    rest = max(1.0 - outside, 0.0)
+    return rest * rest

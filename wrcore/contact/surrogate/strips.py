@@ -12,6 +12,18 @@ import numpy as np
 from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, RADIUS
 from wrcore.contact.moved import smooth_nodes
 from wrcore.contact.reduction import BEYOND, OUTSIDE
+from wrcore.contact.scan import leaves_cells
+from wrcore.contact.strip import (
+    AHEAD,
+    BEND,
+    LIFT,
+    changes_along,
+    cubic_at,
+    on_rail,
+    strip_point,
+    wheel_slope,
+    with_rail_along,
+)
 from wrcore.kernels.jit import FAST, FUSED, jit
 
 MOST_STRIPS = 1024
@@ -19,6 +31,9 @@ MOST_STRIPS = 1024
 
 _END_STRIPS = 16
 """Places kept for the ends of overlaps."""
+
+_NO_RAIL = 1.0
+"""Gap of a strip beyond the end of the rail's profile, m."""
 
 _ANGLE_SERIES = -1.0 / 3.0, 1.0 / 5.0, -1.0 / 7.0, 1.0 / 9.0, -1.0 / 11.0
 """Coefficients of atan(h)/h in powers of h^2; with h the tangent of a quarter of the angle the error is below 1e-6."""
@@ -88,6 +103,23 @@ def _fill_nodes(nodes, wheel, rail, pose, reach, strips):
 
 
 @jit(allocates=False, fastmath=FUSED)
+def _fill_one_by_one(geometry, nodes, pose, strips):
+    """The same for any pose, and for rails that change along the track or wheels out of round; some times as slow."""
+    for k in range(nodes.end):
+        u = nodes.u + nodes.step * k
+        ur, height, radius, slope, _, along = strip_point(geometry, pose, u)
+        rail, rail_slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+        tangent = 0.5 * (rail_slope + wheel_slope(pose, slope, along))
+        cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+        ahead = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+        strips.gap[k] = height - rail if on_rail(geometry, ur) else _NO_RAIL
+        strips.angle[k], strips.cosine[k], strips.lateral[k] = math.atan(tangent), cosine, ur
+        strips.curvature[k] = with_rail_along(geometry, BEND, ur, cosine, 0.5 * cosine / radius)
+        strips.ahead[k] = with_rail_along(geometry, AHEAD, ur, 1.0, ahead)
+        strips.height[k] = with_rail_along(geometry, LIFT, ur, 1.0, height) - pose.z
+
+
+@jit(allocates=False, fastmath=FUSED)
 def _add_end(strips, low, count):
     """Add what sums over nodes miss where the gap changes its sign between the nodes ``low`` and ``low + 1``.
 
@@ -108,7 +140,7 @@ def _add_end(strips, low, count):
 
 @jit(allocates=False, fastmath=FUSED)
 def fill_strips(geometry, pose, row, low, high, strips):
-    """Fill ``strips`` of a patch of a left wheel between two wheel coordinates ``low`` and ``high`` without overlap (m).
+    """Fill ``strips`` of a patch of a left wheel between wheel coordinates without overlap, ``low`` and ``high`` (m).
 
     ``row`` is one of its overlaps (a row of patches, overwritten in OUTSIDE and BEYOND). Returns the number of strips,
     and of those the number at nodes, which come first; 0 if there are fewer than three nodes."""
@@ -118,7 +150,11 @@ def fill_strips(geometry, pose, row, low, high, strips):
     n = nodes.end
     if n < 3 or n > MOST_STRIPS - _END_STRIPS:
         return 0, 0
-    _fill_nodes(nodes, wheel, rail, pose, geometry.half_distance + nodes.u, strips)
+    is_planar = pose.tilt == 0.0 and pose.ex != 0.0
+    if is_planar or changes_along(geometry) or leaves_cells(pose):
+        _fill_one_by_one(geometry, nodes, pose, strips)
+    else:
+        _fill_nodes(nodes, wheel, rail, pose, geometry.half_distance + nodes.u, strips)
     for k in range(n):
         u = nodes.u + nodes.step * k
         if not low < u < high:
