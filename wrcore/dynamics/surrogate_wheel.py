@@ -19,11 +19,11 @@ from wrcore.contact import reduction
 from wrcore.contact.approach import pressed_together
 from wrcore.contact.creepage import creepages
 from wrcore.contact.half_space_coupling import ellipse_of, rise_by_pressure, slip_by_friction, write_ellipse
-from wrcore.contact.normal import contact_modulus
+from wrcore.contact.normal import contact_modulus, hertz_shape_at
 from wrcore.contact.patch.gap import add_force, group_end
 from wrcore.contact.strip import lean_at, leaning, make_pose, upright
 from wrcore.contact.surrogate.descriptors import describe, parabola_at
-from wrcore.contact.surrogate.network import force_remainder, parabolic_at, run_network, trust_in
+from wrcore.contact.surrogate.network import force_remainder, run_network
 from wrcore.contact.surrogate.strips import fill_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.lift import lift_of
@@ -112,8 +112,12 @@ def bounded(x, bound):
 
 
 @jit(allocates=False, forceinline=True)
-def mirrored_ahead(m):
-    """The mirror image, along x, of a wheel that rolls back: it rolls forward."""
+def left_ahead(m):
+    """The motion of a left wheel that rolls forward, of which the wheel is a mirror image: a right one across the
+    track, one that rolls back along it."""
+    m = as_left(m)
+    if m.vx >= 0.0:
+        return m
     return WheelMotion(
         m.side, m.y, m.z, -m.ex, m.ey, m.ez, -m.vx, m.vy, m.vz, m.wx, -m.wy, -m.wz, m.bend_y, m.bend_z, m.friction
     )
@@ -131,8 +135,8 @@ def _lifted_wheel(m, lift, rise, tilt, ellipse):
 @jit(allocates=False, fastmath=FUSED)
 def press_patch(model, m, is_spatial, lean, lift, rows, q, row, work):
     """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel; ``row``
-    (PATCH_COLUMNS,) becomes its deepest overlap."""
-    geometry, surrogate, network, forces = model.geometry, model.surrogate, work.network, work.forces
+    (PATCH_COLUMNS,) becomes its deepest overlap. ``work.network.outputs`` become those of the patch."""
+    geometry, network, forces = model.geometry, work.network, work.forces
     first, last, tilt = forces.first[q], forces.last[q], forces.tilt[q]
     copy_deepest(rows, first, last, row)
     if lift.share >= 1.0:
@@ -143,31 +147,39 @@ def press_patch(model, m, is_spatial, lean, lift, rows, q, row, work):
     count, n = fill_strips(geometry, pose, row, low, high, work.strips)
     friction = max(m.friction, _LEAST_FRICTION)
     shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, network.descriptors)
-    if not shape.length > 0.0:
+    if not shape.square > 0.0:
         return _NO_CONTACT
-    run_network(surrogate, network)
-    trust = trust_in(surrogate, network.descriptors)
-    for k in range(len(network.outputs)):
-        network.outputs[k] *= trust
-    scaled, c = network.outputs, surrogate.corrections
-    log_n, log_a, log_b, log_p = parabolic_at(surrogate.base, network.descriptors[0])
-    size, log_size = shape.length, math.log(shape.length)
-    stiffness = contact_modulus(model.shear_modulus, model.poisson_ratio) * shape.curvature * size
-    load = stiffness * size * size * math.exp(log_n + bounded(c[0] * scaled[0], _MOST_LOG_LOAD))
-    log_a = log_size + log_a + bounded(c[1] * scaled[1], _MOST_LOG_AXIS)
-    log_b = log_size + log_b + bounded(c[2] * scaled[2], _MOST_LOG_AXIS)
-    p_max = stiffness * math.exp(log_p + bounded(c[3] * scaled[3], 2.0 * _MOST_LOG_AXIS))
-    b_over_sigma = math.exp(log_b) / shape.sigma
-    e = bounded(c[5] * scaled[5] * size / shape.sigma, _MOST_PLACE)
-    spread = bounded(0.2 * b_over_sigma * b_over_sigma, 2.0 * _MOST_WIDTH)
+    p = _pressed(model, shape, run_network(model.surrogate, network), model.surrogate.corrections, network.outputs)
+    px, pz = leaning(geometry, lean, p.px, p.pz + tz)
+    return Pressed(
+        p.load, p.log_a, p.log_b, p.p_max, px, p.py + geometry.rail_distance - y + ty, pz, p.angle - 0.5 * tilt, p.trust
+    )
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _pressed(model, shape, trust, scales, outputs):
+    """`Pressed` of a patch of this shape; ``py`` is its rail coordinate, ``px`` and ``pz`` are from the wheelset's
+    centre. ``scales`` multiply the network's first ``outputs``."""
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    half_width, size = math.sqrt(7.0) * shape.sigma, shape.length
+    depth = math.sqrt(0.9375 * shape.square / half_width)  # of the parabolic overlap with this M0 and sigma
+    stiffness, a, b, _ = hertz_shape_at(model.hertz, shape.curvature, depth / (half_width * half_width))
+    root = math.sqrt(depth)
+    load, a, b = modulus * stiffness * depth * root, a * root, b * root
+    p_max = 1.5 * load / (math.pi * a * b) * math.exp(bounded(scales[3] * outputs[3], 2.0 * _MOST_LOG_AXIS))
+    load *= math.exp(bounded(scales[0] * outputs[0], _MOST_LOG_LOAD))
+    log_a = math.log(a) + bounded(scales[1] * outputs[1], _MOST_LOG_AXIS)
+    log_b = math.log(b) + bounded(scales[2] * outputs[2], _MOST_LOG_AXIS)
+    e = bounded(scales[5] * outputs[5] * size / shape.sigma, _MOST_PLACE)
+    b = math.exp(log_b) / shape.sigma
+    spread = bounded(0.2 * b * b, 2.0 * _MOST_WIDTH)
     angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)
-    angle += bounded(c[6] * scaled[6], _MOST_ANGLE) - 0.5 * tilt
+    angle += bounded(scales[6] * outputs[6], _MOST_ANGLE)
     px = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread)
-    px += bounded(c[4] * scaled[4], 1.0) * size
+    px += bounded(scales[4] * outputs[4], 1.0) * size
     pz = parabola_at(shape.height, shape.height_1, shape.height_2, shape.third, e, spread)
-    pz += bounded(c[7] * scaled[7], 1.0) * size + tz
-    py = shape.lateral + e * shape.sigma * math.cos(shape.angle) + geometry.rail_distance - y + ty
-    px, pz = leaning(geometry, lean, px, pz)
+    pz += bounded(scales[7] * outputs[7], 1.0) * size
+    py = shape.lateral + e * shape.sigma * math.cos(shape.angle)
     return Pressed(load, log_a, log_b, p_max, px, py, pz, angle, trust)
 
 
@@ -235,10 +247,10 @@ def _couple(model, count, forces):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _find_patches(geometry, pose, rows, first, last, forces):
+def find_patches(geometry, m, is_spatial, rows, first, last, forces):
     """Number of patches that the overlaps from ``first`` to before ``last`` form; writes where each begins and ends,
     and that nothing presses on them."""
-    count = 0
+    pose, count = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial), 0
     while first < last:
         end = lobe_end(geometry, pose, rows, first, last, _ONE_PATCH)
         forces.first[count], forces.last[count] = first, end
@@ -261,7 +273,7 @@ def _fill_row(m, p, r, place, row):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_patch(geometry, m, lean, p, r, wrench, row):
+def add_patch(geometry, m, lean, p, r, wrench, row):
     """Add a patch's force and moment about the wheelset's centre to ``wrench``, and write its ``row``. Place and forces
     are in axes that ``lean`` as the rail does under the patch."""
     cosine, sine = math.cos(p.angle), math.sin(p.angle)
@@ -276,19 +288,31 @@ def _add_patch(geometry, m, lean, p, r, wrench, row):
     _fill_row(m, p, r, (px, p.py, pz), row)
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lean_of_group(geometry, m, rows, first, last, deepest):
+    """How a rail that changes along the track leans under a group of overlaps; ``deepest`` becomes its deepest row."""
+    copy_deepest(rows, first, last, deepest)
+    return lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lift_of_group(model, m, moving, is_spatial, lean, rows, first, last, moments):
+    """`Lift` of a wheel by the damping of a group of overlaps; ``moving``: the motion in axes that ``lean``."""
+    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial)
+    pressed = pressed_together(model.geometry, pose, is_spatial, lean, rows, first, last, moments)
+    return lift_of(model, moving, pressed)
+
+
 @jit(allocates=False, fastmath=FUSED)
 def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, moments, scratch_rows, work):
     """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
     ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten. ``moments``
     (3, 5) and ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) are scratch."""
     geometry, forces = model.geometry, work.forces
-    pose, deepest = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial), scratch_rows[0]
-    copy_deepest(rows, first, last, deepest)
-    lean = lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
+    lean = lean_of_group(geometry, m, rows, first, last, scratch_rows[0])
     moving = leaning_motion(geometry, m, lean)
-    pressed = pressed_together(geometry, pose, is_spatial, lean, rows, first, last, moments)
-    lift = lift_of(model, moving, pressed)
-    count = _find_patches(geometry, pose, rows, first, last, forces)
+    lift = lift_of_group(model, m, moving, is_spatial, lean, rows, first, last, moments)
+    count = find_patches(geometry, m, is_spatial, rows, first, last, forces)
     rounds = 1 if count == 1 else _ROUNDS
     for turn in range(rounds):
         for q in range(count):
@@ -305,7 +329,7 @@ def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters
             if turn == rounds - 1:
                 counters[OUT_OF_RANGE] += r.missed
                 counters[OUTSIDE_TRAINING] += p.trust < 1.0
-                _add_patch(geometry, m, lean, p, r, wrench, scratch_rows[q])
+                add_patch(geometry, m, lean, p, r, wrench, scratch_rows[q])
         if turn < rounds - 1:
             _couple(model, count, forces)
     for q in range(count):
@@ -316,7 +340,7 @@ def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters
 
 
 @jit(allocates=False)
-def _mirror_back(rows, count, wrench):
+def mirror_back(rows, count, wrench):
     """Patches and wrench of a wheel that rolls forward as those of its mirror image along x, which rolls back."""
     wrench[0], wrench[4], wrench[5] = -wrench[0], -wrench[4], -wrench[5]
     for i in range(count):
@@ -331,8 +355,7 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
             seen = motion_of(motions[i, wheel])
-            m, rolls_back = as_left(seen), seen.vx < 0.0
-            m = mirrored_ahead(m) if rolls_back else m
+            m = left_ahead(seen)
             wrench[:] = 0.0
             count, bound, is_spatial = detect_patches(contact, m, rows)
             if not mode & PATCHES_ONLY:
@@ -345,8 +368,8 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
                     )  # fmt: skip
                     first = last
                 count = kept
-                if rolls_back:
-                    _mirror_back(rows, count, wrench)
+                if seen.vx < 0.0:
+                    mirror_back(rows, count, wrench)
                 if seen.side < 0.0:
                     mirror(rows, count, wrench)
             counts[i, wheel], bounds[i, wheel] = count, bound

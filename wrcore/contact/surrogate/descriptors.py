@@ -36,8 +36,10 @@ _LEAST_FLATNESS = 1e-3
 class PatchShape(NamedTuple):
     """Scales of a patch, and parabolas over e of its angle, place along the rail and height."""
 
+    square: float
+    """M0, m^3; 0 if there is no overlap."""
     length: float
-    """Scale l, m; 0 if there is no overlap."""
+    """Scale l, m."""
     curvature: float
     """A, 1/m."""
     sigma: float
@@ -101,7 +103,7 @@ def describe(strips, count, n, rolling_radius, axle_slope, friction, out):
         d = strips.arc[k] - arc
         variance += strips.weight[k] * d * d
     if not (total > 0.0 and variance > 0.0):
-        return PatchShape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return PatchShape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sigma = math.sqrt(variance * inverse)
     length = math.exp(0.2 * math.log(total / (curvature * curvature)))
     m3 = m4 = m5 = m6 = a1 = a2 = x1 = x2 = c1 = c2 = c3 = c4 = z1 = z2 = 0.0
@@ -137,16 +139,12 @@ def describe(strips, count, n, rolling_radius, axle_slope, friction, out):
     out[0] = math.log(sigma / length)
     out[17], out[18], out[19], out[20], out[21], out[22] = m3, m4, m5, m6, a1, a2
     out[23], out[24], out[25] = ahead / rolling_radius, x1 * per_sigma, x2 / length
-    out[26], out[27], out[28], out[29] = (
-        angle,
-        axle_slope,
-        math.log(friction),
-        math.sin(angle - axle_slope) * per_friction,
-    )
+    out[26], out[27], out[28] = angle, axle_slope, math.log(friction)
+    out[29] = math.sin(angle - axle_slope) * per_friction
     out[30], out[31], out[32], out[33] = c1, c2, c3, c4
     out[34], out[35], out[36], out[37] = c1 * per_friction, c2 * per_friction, c3 * per_friction, c4 * per_friction
     flatness = 1.0 / max(m4 - 1.0 - m3 * m3, _LEAST_FLATNESS)
     return PatchShape(
-        length, curvature, sigma, angle, _lateral_at(strips, n, arc), c1, (c2 - m3 * c1) * flatness, ahead, x1,
+        total, length, curvature, sigma, angle, _lateral_at(strips, n, arc), c1, (c2 - m3 * c1) * flatness, ahead, x1,
         (x2 - m3 * x1) * flatness, height, z1, (z2 - m3 * z1) * flatness, m3,
     )  # fmt: skip

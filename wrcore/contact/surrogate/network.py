@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
-from scipy.special import ellipe, ellipk
+from scipy.interpolate import make_interp_spline
 
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS
 from wrcore.kernels.jit import FAST, FUSED, jit
@@ -25,9 +24,6 @@ network adds to the contact of a parabolic overlap and to the parabolas of `Patc
 
 FORCE_CELLS = 26
 """Cells, in each direction, of the splines of force modes over the disk of creepages."""
-
-_BASE_RANGE, _BASE_NODES = (-5.0, 4.0), 1024
-"""Range and number of nodes of ln(sigma/l) in the table of parabolic overlaps."""
 
 _WEIGHTS = Path(__file__).with_name("weights.npz")
 
@@ -56,9 +52,6 @@ class Surrogate(NamedTuple):
     modes: np.ndarray
     """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes): coefficients of quadratic B-splines of the force modes over
     the disk of creepages, for Fx and Fy (over friction times N) and Mz (over friction times N times c)."""
-    base: np.ndarray
-    """(nodes, 8): ln N/(E* A l^3), ln a/l, ln b/l, ln p_max/(E* A l) of a parabolic overlap over
-    ln(sigma/l), then their slopes times the step."""
 
 
 class SurrogateWork(NamedTuple):
@@ -76,7 +69,7 @@ class SurrogateWork(NamedTuple):
 def no_surrogate():
     """`Surrogate` of a scene without it."""
     none = np.zeros(0)
-    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4), np.zeros((0, 0)))
+    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4))
 
 
 def surrogate_work(surrogate):
@@ -94,7 +87,7 @@ def load_surrogate():
     layers = [np.ascontiguousarray(layer, float) for layer in layers]
     return Surrogate(
         *(z[name].astype(float) for name in ("median", "scale", "least", "greatest")), *layers,
-        z["corrections"].astype(float), _mode_splines(z), parabolic_overlaps(),
+        z["corrections"].astype(float), _mode_splines(z),
     )  # fmt: skip
 
 
@@ -124,50 +117,6 @@ def _mode_splines(z):
     return np.ascontiguousarray(np.moveaxis(both, 0, 1))
 
 
-@cache
-def parabolic_overlaps():
-    """``Surrogate.base``: Hertz's contact (Johnson, Contact Mechanics, 4.2) over the form of the parabolic overlap.
-
-    With p_max = E* and b = 1, an ellipse of the axis ratio g has N = 2 pi g/3, the approach minor K(e) and relative
-    curvatures by K(e) and E(e); its overlap -(delta - B s^2) has M0 = 16/15 delta^2 w and sigma = w/sqrt(7) with
-    w^2 = delta/B."""
-    g = np.exp(np.linspace(math.log(1e-3), math.log(1e3), 4001))
-    major, minor = np.maximum(g, 1.0), np.minimum(g, 1.0)
-    square = np.maximum(1.0 - (minor / major) ** 2, 1e-12)
-    k, e = ellipk(square), ellipe(square)
-    factor = minor / (square * major**2)
-    along, across = factor * (k - e), factor * ((major / minor) ** 2 * e - k)
-    circle = square < 1e-3
-    along[circle] = across[circle] = math.pi / 4.0 / major[circle]
-    a, b, depth = np.where(g >= 1.0, along, across), np.where(g >= 1.0, across, along), minor * k
-    half_width = np.sqrt(depth / b)
-    sigma, length = half_width / math.sqrt(7.0), (16.0 / 15.0 * depth**2 * half_width / a**2) ** 0.2
-    x = np.log(sigma / length)
-    order = np.argsort(x)
-    values = np.stack([np.log(2.0 / 3.0 * math.pi * g / (a * length**3)), np.log(g / length), -np.log(length),
-                       -np.log(a * length)], 1)  # fmt: skip
-    spline, nodes = CubicSpline(x[order], values[order]), np.linspace(*_BASE_RANGE, _BASE_NODES)
-    return np.concatenate([spline(nodes), spline(nodes, 1) * (nodes[1] - nodes[0])], 1)
-
-
-@jit(allocates=False, fastmath=FUSED)
-def parabolic_at(base, log_ratio):
-    """ln N/(E* A l^3), ln a/l, ln b/l and ln p_max/(E* A l) of a parabolic overlap at ln(sigma/l), constant beyond the
-    table."""
-    step = (_BASE_RANGE[1] - _BASE_RANGE[0]) / (_BASE_NODES - 1)
-    place = min(max((log_ratio - _BASE_RANGE[0]) / step, 0.0), _BASE_NODES - 1.000001)
-    i = int(place)
-    low, high, t = base[i], base[i + 1], place - i
-    s = 1.0 - t
-    w, d0, d1 = t * t * (3.0 - 2.0 * t), t * s * s, -t * t * s
-    return (
-        low[0] + w * (high[0] - low[0]) + d0 * low[4] + d1 * high[4],
-        low[1] + w * (high[1] - low[1]) + d0 * low[5] + d1 * high[5],
-        low[2] + w * (high[2] - low[2]) + d0 * low[6] + d1 * high[6],
-        low[3] + w * (high[3] - low[3]) + d0 * low[7] + d1 * high[7],
-    )
-
-
 @jit(allocates=False, fastmath=FAST)
 def _dense(inputs, weights, biases, outputs, bend):
     """One layer; ``bend``: with the activation."""
@@ -185,8 +134,22 @@ def _dense(inputs, weights, biases, outputs, bend):
 
 
 @jit(allocates=False, fastmath=FUSED)
+def trust_in(surrogate, descriptors):
+    """Share of the network's outputs that counts: 1 in the range of the training, falling smoothly to 0 beyond it.
+
+    Each descriptor counts by the square of how far it is outside, over the width of its range."""
+    outside = 0.0
+    for i in range(N_DESCRIPTORS):
+        least, greatest = surrogate.least[i], surrogate.greatest[i]
+        excess = max(least - descriptors[i], descriptors[i] - greatest, 0.0) / (greatest - least)
+        outside += excess * excess
+    rest = max(1.0 - outside, 0.0)
+    return rest * rest
+
+
+@jit(allocates=False, fastmath=FUSED)
 def run_network(surrogate, work):
-    """Fill ``work.outputs`` from ``work.descriptors``."""
+    """Fill ``work.outputs`` from ``work.descriptors``, and return the share of them that counts (`trust_in`)."""
     for i in range(N_DESCRIPTORS):
         x = (work.descriptors[i] - surrogate.median[i]) / surrogate.scale[i]
         work.layer[i] = x / math.sqrt(math.sqrt(1.0 + x * x))
@@ -194,6 +157,10 @@ def run_network(surrogate, work):
     _dense(work.next_layer, surrogate.weights_2, surrogate.biases_2, work.layer, True)
     _dense(work.layer, surrogate.weights_3, surrogate.biases_3, work.next_layer, True)
     _dense(work.next_layer, surrogate.weights_4, surrogate.biases_4, work.outputs, False)
+    trust = trust_in(surrogate, work.descriptors)
+    for k in range(len(work.outputs)):
+        work.outputs[k] *= trust
+    return trust
 
 
 @jit(allocates=False, fastmath=FAST)
@@ -215,17 +182,3 @@ def force_remainder(surrogate, outputs, p, q):
                 x, y, z = x + c * modes[0, m], y + c * modes[1, m], z + c * modes[2, m]
             fx, fy, mz = fx + factor * x, fy + factor * y, mz + factor * z
     return fx, fy, mz
-
-
-@jit(allocates=False, fastmath=FUSED)
-def trust_in(surrogate, descriptors):
-    """Share of the network's outputs that counts: 1 in the range of the training, falling smoothly to 0 beyond it.
-
-    Each descriptor counts by the square of how far it is outside, over the width of its range."""
-    outside = 0.0
-    for i in range(N_DESCRIPTORS):
-        least, greatest = surrogate.least[i], surrogate.greatest[i]
-        excess = max(least - descriptors[i], descriptors[i] - greatest, 0.0) / (greatest - least)
-        outside += excess * excess
-    rest = max(1.0 - outside, 0.0)
-    return rest * rest
