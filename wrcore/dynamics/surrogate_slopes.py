@@ -8,10 +8,11 @@ and are found once for each direction. All is in double precision, so that plain
 Wheels with patches that press each other are left to differences of the whole wrench.
 """
 
+from wrcore.contact import reduction
 from wrcore.contact.moved import MOVES
 from wrcore.contact.patch.gap import group_end
 from wrcore.dynamics.contact_blocks import UNCOUNTED, direction_of, move_along
-from wrcore.dynamics.contact_slopes import SLOPES
+from wrcore.dynamics.contact_slopes import SAME, SLOPES
 from wrcore.dynamics.lift import Lift
 from wrcore.dynamics.motion import motion_of
 from wrcore.dynamics.surrogate_wheel import (
@@ -28,8 +29,8 @@ from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import contact_of, detect_patches, leaning_motion
 from wrcore.kernels.jit import FUSED, jit
 
-DIFFERENCE = 1e-8
-"""Of moves (m, rad) and of the lift (m); and of velocities (m/s, rad/s) over the rolling speed (m/s)."""
+DIFFERENCE, RATE_DIFFERENCE = 1e-9, 1e-8
+"""Of moves (m, rad) and of the lift (m); of velocities (m/s, rad/s) over the rolling speed (m/s)."""
 
 _LIFTED = 1 + MOVES
 """Row of a lifted wheel among the numbers of a patch, after those as it is and after each move."""
@@ -45,26 +46,42 @@ def slopes_of_surrogate(jacobian, model, work):
             contact, slopes = contact_of(model.contact, k, wheel), jacobian.slopes[k, wheel]
             slopes[:] = 0.0
             found = _wheel_slopes(
-                contact, jacobian.motions[k, wheel], work.motions[k, wheel], work.patches[k, wheel], slopes,
+                contact, jacobian.motions[k, wheel], work.motions[k, wheel], jacobian.patches[:, k, wheel], slopes,
                 jacobian.wrenches[k], work.strips,
             )  # fmt: skip
             work.counts[k, wheel] = max(found, 0)
             jacobian.counts[k, wheel] = found if found >= 0 else UNCOUNTED
 
 
+@jit(allocates=False)
+def _search(contact, base, moved, found):
+    """Number of overlaps of a wheel, and whether detection was spatial: fills ``found[0]`` with their rows, and
+    ``found[1 + k]`` with those after each move. The number is -1 where a move makes others of them."""
+    count, _, is_spatial = detect_patches(contact, left_ahead(motion_of(base)), found[0])
+    for k in range(MOVES):
+        move_along(base, direction_of(k), DIFFERENCE, moved)
+        if detect_patches(contact, left_ahead(motion_of(moved)), found[1 + k])[0] != count:
+            return -1, is_spatial
+        for i in range(count):
+            if abs(found[1 + k, i, reduction.U_WHEEL] - found[0, i, reduction.U_WHEEL]) > SAME:
+                return -1, is_spatial
+    return count, is_spatial
+
+
 @jit(allocates=False, fastmath=FUSED)
-def _wheel_slopes(contact, base, moved, rows, slopes, wrenches, work):
-    """Add the slopes of one wheel to ``slopes``; returns the number of its overlaps, -1 where patches press each other.
-    ``base``: its motion; ``moved`` (the same shape), ``rows`` and ``wrenches`` (2, 6) are scratch."""
+def _wheel_slopes(contact, base, moved, found, slopes, wrenches, work):
+    """Add the slopes of one wheel to ``slopes``; returns the number of its overlaps, -1 where patches press each other
+    or a move makes others of them. ``base``: its motion; ``moved`` (the same shape), ``found`` (1 + MOVES, MAX_PATCHES,
+    PATCH_COLUMNS) and ``wrenches`` (2, 6) are scratch."""
     seen = motion_of(base)
     m, first = left_ahead(seen), 0
-    count, _, is_spatial = detect_patches(contact, m, rows)
+    count, is_spatial = _search(contact, base, moved, found)
     while first < count:
-        last = group_end(contact.geometry, rows, count, first)
-        if find_patches(contact.geometry, m, is_spatial, rows, first, last, work.surrogate.forces) > 1:
+        last = group_end(contact.geometry, found[0], count, first)
+        if find_patches(contact.geometry, m, is_spatial, found[0], first, last, work.surrogate.forces) > 1:
             return -1
-        if _find_numbers(contact, base, moved, is_spatial, rows, first, last, work):
-            _add_slopes(contact, base, moved, is_spatial, rows, first, last, slopes, wrenches, work)
+        if _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
+            _add_slopes(contact, base, moved, is_spatial, found[0], first, last, slopes, wrenches, work)
         first = last
     for i in range(6):
         sign = -1.0 if seen.side < 0.0 and i % 2 == 1 else 1.0
@@ -75,14 +92,14 @@ def _wheel_slopes(contact, base, moved, rows, slopes, wrenches, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _find_numbers(contact, base, moved, is_spatial, rows, first, last, work):
+def _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
     """Fill ``work.surrogate.numbers`` (in each row `_FIELDS`, then outputs of the network) of the only patch of a group
     of overlaps; False where the wheel hangs in the air."""
     surrogate, lean, row = work.surrogate, (1.0, 0.0), work.rows[0]
     for n in range(2 + MOVES):
         difference = DIFFERENCE if 0 < n < _LIFTED else 0.0
         move_along(base, direction_of(max(n - 1, 0) % MOVES), difference, moved)
-        m = left_ahead(motion_of(moved))
+        m, rows = left_ahead(motion_of(moved)), found[n if n < _LIFTED else 0]
         if n == 0:
             lean = lean_of_group(contact.geometry, m, rows, first, last, row)
         moving = leaning_motion(contact.geometry, m, lean)
@@ -106,7 +123,7 @@ def _add_slopes(contact, base, moved, is_spatial, rows, first, last, slopes, wre
     now, lifted, mixed = numbers[0], numbers[_LIFTED], numbers[_LIFTED + 1]
     speed, share = max(abs(motion_of(base).vx), contact.least_speed), 0.0
     for j in range(-1, SLOPES):
-        difference = 0.0 if j < 0 else DIFFERENCE if j < MOVES else DIFFERENCE * speed
+        difference = 0.0 if j < 0 else DIFFERENCE if j < MOVES else RATE_DIFFERENCE * speed
         move_along(base, direction_of(max(j, 0)), difference, moved)
         m = left_ahead(motion_of(moved))
         if j < 0:

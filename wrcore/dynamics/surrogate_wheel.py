@@ -60,7 +60,7 @@ _MOST_PLACE, _MOST_WIDTH = 3.0, 3.0
 has 0 and 1.4."""
 
 _MOST_MOMENT = 1.0
-"""Bound of the moment about the normal over friction times N times c; Kalker's theory stays below 0.6."""
+"""Bound of what the network adds to the moment about the normal, over friction times N times c."""
 
 
 class Pressed(NamedTuple):
@@ -205,7 +205,7 @@ def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
     part = (m.wy * radius / speed - 1.0) / LOCKED
     fade = max(0.0, 1.0 - part * part)
     fade *= fade
-    f1, f2, m3 = f1 + fade * r1, f2 + fade * r2, bounded(m3 + fade * r3, 2.0 * _MOST_MOMENT)
+    f1, f2, m3 = f1 + fade * r1, f2 + fade * r2, m3 + fade * bounded(r3, _MOST_MOMENT)
     less = 1.0 / max(math.sqrt(f1 * f1 + f2 * f2), 1.0)
     f1, f2, m3 = without_power(less * f1, less * f2, m3, x, y, phi * c)
     return Rolled(xi, eta, phi, limit * f1, limit * f2, limit * c * m3, missed)

@@ -130,11 +130,15 @@ def describe(strips, count, n, rolling_radius, axle_slope, friction, out):
         w = strips.weight[k] * inverse
         if w != 0.0:
             place = 2.0 * (strips.arc[k] - arc) * per_sigma + 0.5 * (N_SPLINES - 1)
-            j = int(min(max(place + 0.5, 1.0), N_SPLINES - 1.5))
-            t = place - j
-            out[j] += w * 0.5 * (0.5 - t) * (0.5 - t)
-            out[j + 1] += w * (0.75 - t * t)
-            out[j + 2] += w * 0.5 * (0.5 + t) * (0.5 + t)
+            if -1.5 < place < N_SPLINES + 0.5:
+                j = int(place + 2.5) - 2  # the nearest centre, -1 to N_SPLINES
+                t = place - j
+                if j > 0:
+                    out[j] += w * 0.5 * (0.5 - t) * (0.5 - t)
+                if 0 <= j < N_SPLINES:
+                    out[1 + j] += w * (0.75 - t * t)
+                if j < N_SPLINES - 1:
+                    out[2 + j] += w * 0.5 * (0.5 + t) * (0.5 + t)
     per_friction = 1.0 / friction
     out[0] = math.log(sigma / length)
     out[17], out[18], out[19], out[20], out[21], out[22] = m3, m4, m5, m6, a1, a2

@@ -22,7 +22,7 @@ N_CORRECTIONS = 8
 """ln N, ln a, ln b, ln p_max, place along and across the patch over l, contact angle (rad), height over l: what the
 network adds to the contact of a parabolic overlap and to the parabolas of `PatchShape`."""
 
-FORCE_CELLS = 26
+FORCE_CELLS = 36
 """Cells, in each direction, of the splines of force modes over the disk of creepages."""
 
 _WEIGHTS = Path(__file__).with_name("weights.npz")
@@ -50,7 +50,7 @@ class Surrogate(NamedTuple):
     corrections: np.ndarray
     """(N_CORRECTIONS,): scales of the corrections."""
     modes: np.ndarray
-    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes): coefficients of quadratic B-splines of the force modes over
+    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes) float32: coefficients of quadratic B-splines of the force modes over
     the disk of creepages, for Fx and Fy (over friction times N) and Mz (over friction times N times c)."""
 
 
@@ -69,7 +69,7 @@ class SurrogateWork(NamedTuple):
 def no_surrogate():
     """`Surrogate` of a scene without it."""
     none = np.zeros(0)
-    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4))
+    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4, np.float32))
 
 
 def surrogate_work(surrogate):
@@ -114,7 +114,7 @@ def _mode_splines(z):
     knots = (np.arange(-2, FORCE_CELLS + 3)) * 2.0 / FORCE_CELLS - 1.0
     along = make_interp_spline(nodes, values, k=2, t=knots, axis=0).c
     both = make_interp_spline(nodes, np.moveaxis(along, 1, 0), k=2, t=knots, axis=0).c
-    return np.ascontiguousarray(np.moveaxis(both, 0, 1))
+    return np.ascontiguousarray(np.moveaxis(both, 0, 1), np.float32)
 
 
 @jit(allocates=False, fastmath=FAST)
