@@ -119,14 +119,20 @@ def _mode_splines(z):
 
 @jit(allocates=False, fastmath=FAST)
 def _dense(inputs, weights, biases, outputs, bend):
-    """One layer; ``bend``: with the activation."""
-    n = weights.shape[1]
+    """One layer; ``bend``: with the activation. Four inputs at a time: outputs are read and written a quarter as
+    often."""
+    rows, n = weights.shape
     for j in range(n):
         outputs[j] = biases[j]
-    for i in range(weights.shape[0]):
-        x, row = inputs[i], weights[i]
+    for i in range(0, rows - rows % 4, 4):
+        a, b, c, d = inputs[i], inputs[i + 1], inputs[i + 2], inputs[i + 3]
+        of_a, of_b, of_c, of_d = weights[i], weights[i + 1], weights[i + 2], weights[i + 3]
         for j in range(n):
-            outputs[j] += x * row[j]
+            outputs[j] += (a * of_a[j] + b * of_b[j]) + (c * of_c[j] + d * of_d[j])
+    for i in range(rows - rows % 4, rows):
+        a, of_a = inputs[i], weights[i]
+        for j in range(n):
+            outputs[j] += a * of_a[j]
     if bend:
         for j in range(n):
             x = outputs[j]
