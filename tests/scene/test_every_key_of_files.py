@@ -71,7 +71,7 @@ def test_each_key_of_slices_has_a_case_here():
 
 ENDINGS = {"rail": "slcs", "wheel": "slcw"}
 PLACES = {"rail": np.arange(12) * 0.1, "wheel": np.arange(12) * TURN / 12}
-"""Of slices, m or rad."""
+"""Places of the slices: along the rail, m, or round the wheel, rad."""
 
 
 def sections(folder, kind, sign=1.0):
@@ -97,19 +97,17 @@ def surface(spec, kind):
     return read_slices(spec, kind).heights(PLACES[kind][:-1] + 0.3 * PLACES[kind][1], u)[0].tobytes()
 
 
-def changes_or_is_refused(before, spec, kind):
-    try:
-        assert surface(spec, kind) != before
-    except InputError as error:
-        assert "\n" not in str(error)
-
-
 @pytest.mark.parametrize("kind", ENDINGS)
 @pytest.mark.parametrize("key", SLICE_KEYS)
-def test_key_of_slices_changes_the_surface_or_is_refused(key, kind, tmp_path):
+def test_key_of_slices_changes_the_surface(key, kind, tmp_path):
     sections(tmp_path, kind)
     plain = {"slices": table_of_slices(tmp_path, kind), "unit": "mm"}
-    changes_or_is_refused(surface(plain, kind), plain | {key: SLICE_KEYS[key]}, kind)
+    other = plain | {key: SLICE_KEYS[key]}
+    if key == "unit":  # sections in mm, read as inches, are metres wide
+        with pytest.raises(InputError, match="expected a profile within 0.5 m"):
+            surface(other, kind)
+    else:
+        assert surface(other, kind) != surface(plain, kind)
 
 
 @pytest.mark.parametrize("kind", ENDINGS)

@@ -23,7 +23,7 @@ from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import SIDES
 
 EDGES = 2.5e-4 * np.arange(-300, 301)
-"""Of the bins of wear, m."""
+"""Edges of the bins of wear, m."""
 
 
 def hump(place, width):

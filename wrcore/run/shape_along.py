@@ -1,10 +1,10 @@
 """Patches of a run whose surfaces along the rail are no parabola: flats, bumps, joints, noses of crossings.
 
 Runs know the gap along the rail by one parabola per place across. Where the real gap leaves it within a patch by more
-than `ROUGH` of the penetration, the maximum pressure and the area of that patch are too low; single poses take a grid
-there (`wrcore.analysis.contact.on_slices`). Runs count such patches at their output times, from the section of the real
-surfaces along the middle of each patch. They are compared with the parabola that the run's tables hold: of a wheelset
-in the middle without yaw, a yaw moves it along the rail.
+than `ROUGH` of the penetration, the maximum pressure of that patch may be too low; single positions of a wheelset are
+solved on a grid there (`wrcore.analysis.contact.on_slices`). Runs count such patches at their output times, from the
+section of the real surfaces along the middle of each patch. They are compared with the parabola that the run's tables
+hold: of a wheelset in the middle without yaw, a yaw moves it along the rail.
 """
 
 import math
@@ -37,7 +37,7 @@ LEAST_STEP, LARGEST_STEP, PER_SLICE = 1e-3, 1e-2, 10
 """Distance of sections of a rail, m, and their number between two slices of a rail whose heads go through."""
 
 LENGTH = 2.0
-"""Of a rail whose sections are taken at a time, m."""
+"""Length of rail whose sections are taken at a time, m."""
 
 _AT_A_TIME = 2000  # patches, for memory: 3 MB an array
 
@@ -192,13 +192,13 @@ def _of_rail(rail, crossing, s, below, x, u_rail, u_wheel, radii):
 
 
 def warn_of_shapes(source, counters, rate):
-    """Say which wheels of a run have patches that are no parabola along the rail, at how many output times, a ``rate``
-    (1/s) apart, and what that means."""
+    """Warn of patches that are no parabola along the rail: on which wheels, and at how many output times, which are at
+    a ``rate`` (1/s)."""
     if not counters.get(NAME):
         return
     wheels = {name.removeprefix(f"{NAME}_"): n for name, n in counters.items() if name.startswith(f"{NAME}_")}
     said = ", ".join(f"{name} at {n} output times ({n / rate:.3g} s)" for name, n in wheels.items())
     warn(
-        f"{source}: surfaces along the rail are no parabola within patches of {said}: the maximum pressure, by up to"
-        " 35 %, and the area are too low there; 'wrcore contact --patch grid' takes the real surfaces"
+        f"{source}: surfaces along the rail are no parabola within patches of {said}: their maximum pressure may be too"
+        " low, by up to a quarter where it was measured; 'wrcore contact --patch grid' takes the real surfaces"
     )

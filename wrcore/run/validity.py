@@ -64,7 +64,7 @@ MEANINGS = {
     "finds no deepest point",
     "both_flanges": "a wheelset that touches with both flanges: it does not fit between the rails",
     "not_parabolic": "a patch on a wheel out of round, a crossing or a corrugated rail whose gap along the rail leaves "
-    "the parabola of a run by more than 5 % of the penetration: p_max, by up to 35 %, and area are too low there. "
+    "the parabola of a run by more than 5 % of the penetration: p_max may be too low there. "
     "`not_parabolic_WHEELSET_SIDE` counts the output times of each wheel that has any",
     "before_irregularity": "an output time at which no wheelset has reached the first sample of the irregularity",
     "beyond_irregularity": "a wheelset past the last sample of the track's irregularity, on perfect rails again",

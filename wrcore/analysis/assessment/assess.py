@@ -60,7 +60,7 @@ SOURCES = {
     "sum_Y": FILTERED, "Y_over_Q": FILTERED, "Y_qst": f"{FILTERED}; low confidence in tight curves",
     "Q": f"{FILTERED}; low confidence above 160 km/h", "Q_qst": FILTERED,
 }  # fmt: skip
-"""What limit and filter of each quantity stand on: none was read in the standard."""
+"""Sources of the limit and the filter of each quantity; none was read in the standard."""
 
 MEANS = "sum_Y", "Y_over_Q"
 """Quantities that are sliding means, in steps of `STEP`."""
