@@ -27,7 +27,7 @@ from wrcore.creep.table import build_table
 from wrcore.errors import short
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
-SHORT = {"integration.duration": 0.12, "output.rate": 1000.0, "contact.creep.model": "linear"}
+SHORT = {"integration.duration": 0.4, "output.rate": 1000.0, "contact.creep.model": "linear"}
 
 
 @cache

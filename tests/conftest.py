@@ -13,7 +13,7 @@ import pytest
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
-from wrcore.scene import description
+from wrcore.scene import creep
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
@@ -114,9 +114,9 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def no_new_tables():
     """A spoiled material would have a creep table built, which takes its time: only the one at hand is given."""
-    table = description.ensure_table()
+    table = creep.ensure_table()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(description, "ensure_table", lambda *_: table)
+        patch.setattr(creep, "ensure_table", lambda *_: table)
         yield table
 
 

@@ -60,9 +60,9 @@ def main():
     if not 0.0 <= asked.settle < asked.duration:
         parser.error(f"--settle: expected less than the duration of {asked.duration:g} s, got {asked.settle:g} s")
     begin, asked_of = None, (asked.plan, asked.folder, asked.step, asked.scene)
-    settings = {
-        one: {"contact.patch": one, "contact.resolution": asked.resolution} for one in (*asked.patches, "moment")
-    }
+    settings = {one: {"contact.patch": one} for one in (*asked.patches, "moment")}
+    for strips in {"exact", "tabulated"} & set(settings):
+        settings[strips]["contact.resolution"] = asked.resolution
     try:
         scenes = {patch: worn_scene(*asked_of, changes) for patch, changes in settings.items()}
     except InputError as error:
