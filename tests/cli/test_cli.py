@@ -179,6 +179,13 @@ def test_the_module_is_the_command():
     assert done.stdout.strip() == f"wrcore {wr.__version__}"
 
 
+def test_no_garbage_is_looked_for_when_the_command_ends():
+    code = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 1000))"  # said last
+    code += "; from wrcore.cli import main; main(['profiles'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert done.stdout.split()[-1] == "True"
+
+
 def test_a_shell_that_completes_is_handed_the_parser(monkeypatch, capsys):
     asked = []
     monkeypatch.setitem(sys.modules, "argcomplete", SimpleNamespace(autocomplete=asked.append))

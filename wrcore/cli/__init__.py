@@ -4,6 +4,7 @@ Exit status 0 only when the result was produced; 2 for bad input, with one line 
 what was expected.
 """
 
+import atexit
 import gc
 import os
 import sys
@@ -66,6 +67,7 @@ def main(arguments=None):
     failed, 4 an accuracy not reached or of a derailment, 128 and its number for a signal.
     """
     gc.set_threshold(GARBAGE)
+    atexit.register(gc.freeze)  # else Python looks, as it ends, for garbage in all that it drops, a tenth of a run
     whole = parser()
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next: eval "$(register-python-argcomplete wrcore)"
         with suppress(ImportError):
