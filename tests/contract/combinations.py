@@ -11,16 +11,16 @@ from wrcore.scene.description import compile_scene
 
 SCENE = ROOT / "config" / "scenes" / "suspended_wheelset.yaml"
 
-ELLIPSES, STRIPS = ("maximum", "moment"), ("tabulated", "exact")
+ELLIPSES, STRIPS, NETWORK = ("maximum", "moment"), ("tabulated", "exact"), ("surrogate",)
 LAWS = "table", "linear", "she", "polach", "fastsim"
 DETECTIONS = "spatial", "planar", "auto"
 METHODS = "tsit5", "rk4", "rodas5", "ros34pw2", "auto"
 
-FORCES = [*product(ELLIPSES, LAWS, DETECTIONS), *product(STRIPS, ("table",), DETECTIONS)]
+FORCES = [*product(ELLIPSES, LAWS, DETECTIONS), *product(STRIPS + NETWORK, ("table",), DETECTIONS)]
 """Patch model, creep law and detection that a scene may combine."""
 
-REFUSED = list(product(STRIPS, LAWS[1:]))
-"""Patch model and creep law that a scene may not combine: patches on strips have creep forces of their own."""
+REFUSED = list(product(STRIPS + NETWORK, LAWS[1:]))
+"""Patch model and creep law that a scene may not combine: exact contact has creep forces of its own."""
 
 MOTIONS = [
     ("maximum", "linear", "spatial", "tsit5"), ("maximum", "fastsim", "planar", "rodas5"),
@@ -29,6 +29,7 @@ MOTIONS = [
     ("tabulated", "table", "spatial", "tsit5"), ("tabulated", "table", "spatial", "rk4"),
     ("tabulated", "table", "spatial", "rodas5"), ("tabulated", "table", "spatial", "ros34pw2"),
     ("exact", "table", "spatial", "auto"), ("exact", "table", "planar", "tsit5"),
+    ("surrogate", "table", "spatial", "rodas5"), ("surrogate", "table", "auto", "rk4"),
 ]  # fmt: skip
 """Each patch model, law, detection and method, and each method with the default patch model, in short runs."""
 

@@ -76,8 +76,9 @@ def add(commands):
         help="search in the wheelset's cross-section only, or ahead and behind it, too",
     )  # fmt: skip
     command.add_argument(
-        "--patch", choices=("maximum", "moment", "exact", "tabulated", "grid"), default="moment",
-        help="reduction of an overlap to an ellipse, or the real patch: solved, or, where the wheel rolls, looked up",
+        "--patch", choices=("maximum", "moment", "exact", "tabulated", "surrogate", "grid"), default="moment",
+        help="reduction of an overlap to an ellipse, or the real patch: solved, where the wheel rolls looked up, or "
+        "from a trained network",
     )  # fmt: skip
     command.add_argument(
         "--resolution", choices=("coarse", "middle", "fine"), default="fine", help="of strips and grids"

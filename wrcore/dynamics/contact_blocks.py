@@ -85,13 +85,13 @@ def _accelerations(t, state, model, work, body, direction, out):
 
 
 @jit(allocates=False, inline="always")
-def _direction_of(slope):
+def direction_of(slope):
     """Direction of a row of slopes."""
     return MOVING[slope] if slope < MOVES else slope + 2
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _moved(base, direction, difference, row):
+def move_along(base, direction, difference, row):
     """Write a wheel's motion with a difference in one direction of its rail's frame into ``row``."""
     m = motion_of(base)
     copy_into(row, base)
@@ -106,7 +106,7 @@ def _moved(base, direction, difference, row):
 @jit(allocates=False, inline="always")
 def _difference(slope, fine):
     """Difference of a row of slopes, those of velocities multiplied by ``fine``."""
-    direction = _direction_of(slope)
+    direction = direction_of(slope)
     if direction >= 6:
         return fine * (SPEED if direction < 9 else SPIN)
     return DISPLACEMENT if direction < 3 else TURN
@@ -117,7 +117,7 @@ def _move_all(base, slope, difference, work):
     """Write all wheels' motions, with a difference in the direction of a row of slopes, into the work."""
     for k in range(base.shape[0]):
         for wheel in range(2):
-            _moved(base[k, wheel], _direction_of(slope), difference, work.motions[k, wheel])
+            move_along(base[k, wheel], direction_of(slope), difference, work.motions[k, wheel])
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -171,7 +171,7 @@ def add_slopes(jacobian, state, model, columns):
                 _turn_apart(m, half, model.bodies.inertia[body, 1], slopes)
                 _add_share(rail, wheel, slopes[slopes.shape[0] - 1], 1.0, columns[k, columns.shape[1] - 1])
             for j in range(SLOPES):
-                direction = _direction_of(j)
+                direction = direction_of(j)
                 _add_column(rail, wheel, direction, slopes[j], 1.0, columns[k])
                 if direction == ROLL or direction == YAW:
                     share = -(m.ex if direction == ROLL else m.ez) / m.ey

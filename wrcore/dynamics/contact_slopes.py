@@ -20,7 +20,7 @@ from wrcore.contact.moved import MOVES
 from wrcore.contact.normal import damping_factor
 from wrcore.contact.strip import changes_along
 from wrcore.creep.laws import LAWS, creep_force_at
-from wrcore.dynamics.wheel import falling, normal_ellipse
+from wrcore.dynamics.wheel import falling, is_elliptic, normal_ellipse
 from wrcore.kernels.jit import FUSED, jit
 
 SLOPES = MOVES + 6
@@ -49,7 +49,7 @@ def slope_scratch(model):
 def differentiable(contact):
     """Whether `patch_slopes` is all there is to a contact model: no strips, no shape numbers, no rail that leans."""
     shaped = contact.law == TABLE and contact.creep.table.axes.n_psi > 1
-    return not (contact.strips.strips or shaped or changes_along(contact.geometry))
+    return is_elliptic(contact) and not (shaped or changes_along(contact.geometry))
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -30,7 +30,7 @@ from wrcore.dynamics.inertia import add_carried_gyroscopic, carrying, inertia_ax
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.suspension import element_energies, pack_elements
 from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at, workspace
-from wrcore.dynamics.wheel import OUT_OF_RANGE, normal_contact
+from wrcore.dynamics.wheel import OUT_OF_RANGE, is_elliptic, normal_contact
 from wrcore.kernels.jit import jit
 
 CHANNELS = (
@@ -107,7 +107,7 @@ def _elastic_contact_energy(contact, work):
             for i in range(work.counts[k, wheel]):
                 row = work.patches[k, wheel, i]
                 delta = row[reduction.PENETRATION]
-                if contact.strips.strips > 0:  # no potential is known: that of an ellipse under the same force
+                if not is_elliptic(contact):  # no potential is known: that of an ellipse under the same force
                     force = row[reduction.NORMAL]
                 else:
                     along, across = row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y]

@@ -40,8 +40,8 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
-        strips[:3], sizes, len(set(looked_up(model))), *model.controls.period, *map(np.shape, model.controls),
-        model.crossing.tables.shape, model.check_rails.rows.shape,
+        len(contact.surrogate.median), strips[:3], sizes, len(set(looked_up(model))), *model.controls.period,
+        *map(np.shape, model.controls), model.crossing.tables.shape, model.check_rails.rows.shape,
     )  # fmt: skip
 
 

@@ -150,7 +150,8 @@ def workspace(model):
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(COUNTERS, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
-        strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
+        strip_work(model.contact.strips, k, surrogate=model.contact.surrogate), track_work(model.flexible_track, k),
+        control_work(model.controls),
         np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, KNOWN), np.nan),
         np.zeros((len(model.crossing.tables), 2), np.uint64),
         np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),
@@ -338,6 +339,10 @@ def with_kernels(model, work):
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
         wrenches, contact = strip_wrenches, with_groups(contact, work.strips)
+    elif len(contact.surrogate.median):
+        from wrcore.dynamics.surrogate_wheel import surrogate_wrenches
+
+        wrenches = surrogate_wrenches
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 

@@ -12,17 +12,19 @@ from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
 from wrcore.contact.strip import changes_along, lean_at, leaning, upright
+from wrcore.contact.surrogate.network import Surrogate, no_surrogate
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, WheelMotion, motion_of
 from wrcore.kernels.handles import call_address, other_at
 from wrcore.kernels.jit import FUSED, jit
 
-EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED = range(5)
+EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
 """Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
-pair's table that were solved instead of looked up, and patches on fixed strips, whose tips were not found."""
+pair's table that were solved instead of looked up, patches on fixed strips, whose tips were not found, and patches of
+the surrogate outside the range of its training."""
 
-COUNTERS = 5
+COUNTERS = 6
 
 
 class ContactModel(NamedTuple):
@@ -52,6 +54,8 @@ class ContactModel(NamedTuple):
     wheels: np.ndarray = np.zeros(0, np.int64)
     """The same as `Handles` of contact models, see `wrcore.dynamics.system.with_wheels`."""
     friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
+    surrogate: Surrogate = no_surrogate()
+    """Trained network of exact contact, if the scene asks for it."""
 
 
 def alone(contact, **more):
@@ -74,9 +78,15 @@ def press_wheels(model, work, mode):
     )  # fmt: skip
 
 
+@jit(allocates=False, forceinline=True)
+def is_elliptic(contact):
+    """Whether the patches of a `ContactModel` are ellipses."""
+    return not contact.strips.strips and len(contact.surrogate.median) == 0
+
+
 def shaped(contact):
     """Whether a `ContactModel` asks for the shape numbers of its patches."""
-    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and not contact.strips.strips
+    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and is_elliptic.py_func(contact)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

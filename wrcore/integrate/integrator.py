@@ -32,7 +32,7 @@ from wrcore.dynamics.blame import LawWatch, blame
 from wrcore.dynamics.contract import begin, kept_size, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
-from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, OUT_OF_RANGE, SOLVED
+from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
 from wrcore.errors import InputError
 from wrcore.integrate import choice, engine
 from wrcore.integrate.blocks import new_system
@@ -303,7 +303,7 @@ class Integration:
             float(last if completed else memory.clock[engine.T]),
             (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
             int(work.counters[ON_GRID]), int(work.counters[ON_FIXED]), int(work.counters[SOLVED]),
-            int(work.flexible_track.unbalanced[0]),
+            int(work.counters[OUTSIDE_TRAINING]), int(work.flexible_track.unbalanced[0]),
         )  # fmt: skip
 
 

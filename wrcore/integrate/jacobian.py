@@ -184,6 +184,10 @@ def _slopes_by_hand(contact):
     """Kernel of what a contact model's patches change by, None where there is none."""
     if differentiable.py_func(contact):
         return slopes_of_patches
+    if len(contact.surrogate.median) > 0:
+        from wrcore.dynamics.surrogate_slopes import slopes_of_surrogate
+
+        return slopes_of_surrogate
     if not contact.strips.looked_up:
         return None
     from wrcore.dynamics.lobe_slopes import slopes_of_lobes

@@ -22,7 +22,7 @@ from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.outputs import check_rail_history, drive_history, evaluations_at, motion_history
 from wrcore.dynamics.system import Equations, Model, independent_at, workspace
 from wrcore.dynamics.track import track_poses
-from wrcore.dynamics.wheel import shaped
+from wrcore.dynamics.wheel import is_elliptic, shaped
 from wrcore.errors import InputError
 from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.irregularity import irregularity_extents
@@ -46,7 +46,7 @@ COUNTERS = {
     "factorisations": "factorisations", "smallest_step_s": "smallest_step", "step_collapses": "collapses",
     "table_out_of_range": "out_of_range", "patches_on_grid": "on_grid",
     "patches_on_fixed_strips": "on_fixed_strips", "patches_not_tabulated": "not_tabulated",
-    "rails_unbalanced": "unbalanced", "wall_s": "wall_s",
+    "patches_outside_training": "outside_training", "rails_unbalanced": "unbalanced", "wall_s": "wall_s",
 }  # fmt: skip
 """Counters of a run, and what a `Trajectory` calls them."""
 
@@ -287,7 +287,7 @@ class Simulation:
         groups = {}
         for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
             channels = {key: rows[..., column] for key, column in reduction.CHANNELS.items()}
-            if self.model.contact.strips.strips:
+            if not is_elliptic.py_func(self.model.contact):
                 channels["p_max_Pa"] = rows[..., reduction.P_MAX]
             if shaped(self.model.contact):
                 channels["psi"] = rows[..., reduction.PSI]

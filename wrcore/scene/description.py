@@ -21,6 +21,7 @@ from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
+from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, OWN
 from wrcore.dynamics.crossing import no_crossing
@@ -353,6 +354,7 @@ def compile_scene(
                         friction.largest),
             friction.ratio, friction.decay,
             geometries, plain, friction_factors=friction.factors,
+            surrogate=load_surrogate() if contact["patch"] == "surrogate" else no_surrogate(),
         ),
         elements, vehicle.joints,
         TrackModel(bool(track.tangent), track.path, track.irregularity),

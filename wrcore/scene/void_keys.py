@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
+from wrcore.contact.patch.model import STRIPS
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError, short
@@ -32,7 +33,7 @@ say_once = cache(tell)
 REFERENCES = ("scipy_", "cvode")
 """Beginnings of the names of methods of other packages."""
 
-_STRIPS = "contact.patch", lambda patch: patch in REDUCTIONS, "which has no strips, unlike exact and tabulated"
+_STRIPS = "contact.patch", lambda patch: patch not in STRIPS, "which has no strips, unlike exact and tabulated"
 _ELLIPSES = "contact.patch", lambda patch: patch not in REDUCTIONS, "which has creep forces of its own"
 _FIXED = "integration.step", lambda step: step > 0.0, "which fixes the length of all steps"
 _LAW = "contact.creep.model", lambda model: model != "table", "which has no table"

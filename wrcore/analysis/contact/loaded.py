@@ -27,11 +27,13 @@ from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, height_of_zero, settle
 from wrcore.contact.strip import make_pose
+from wrcore.contact.surrogate.network import load_surrogate
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
 from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
 from wrcore.dynamics.patch_kernels import with_fallback, with_late
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
+from wrcore.dynamics.surrogate_wheel import surrogate_wrenches
 from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
 from wrcore.dynamics.wheel import COUNTERS, ON_FIXED, ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
@@ -125,7 +127,8 @@ class LoadedWheels:
         self.tabulated = model == "tabulated"
         self.grids = GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
         strips = strip_model("exact" if self.always or self.tabulated else model, resolution, slip, self.poisson_ratio)
-        self._work = strip_work(strips, 1)
+        self.is_surrogate, self.is_elliptic = model == "surrogate", model in REDUCTIONS
+        self._work = strip_work(strips, 1, surrogate=load_surrogate() if self.is_surrogate else None)
         self._work.normal.left[1:] = steps
         contact = ContactModel(
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
@@ -133,6 +136,9 @@ class LoadedWheels:
         )  # fmt: skip
         if strips.strips:
             contact = with_fallback(contact._replace(**more))
+        elif self.is_surrogate:
+            law = {"law": LAWS["table"], "creep": _table(self.poisson_ratio)}
+            contact = contact._replace(surrogate=load_surrogate(), **law, **more)
         self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
         self._rolling = {}
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(COUNTERS, np.int64)
@@ -169,7 +175,7 @@ class LoadedWheels:
         friction."""
         if looked_up not in self._rolling:
             contact = self._still
-            if looked_up or not contact.strips.strips:
+            if looked_up or self.is_elliptic:
                 contact = contact._replace(law=LAWS["table"], creep=_table(self.poisson_ratio))
             if looked_up:
                 contact = with_late(contact._replace(strips=contact.strips._replace(looked_up=float(looked_up))))
@@ -198,11 +204,13 @@ class LoadedWheels:
         motions, counts = np.array([[m, m]]), np.zeros((1, 2), np.int64)
         rows, wheel = np.zeros((1, 2, MAX_PATCHES, PATCH_COLUMNS)), int(SIDES[side] < 0.0)
         motions[0, 1 - wheel, MOTION.z] += 1.0  # the other wheel is out of reach
-        wheel_wrenches(contact, motions, rows, counts, np.zeros((1, 2)), np.zeros((1, 2, 6)), self._counters,
-                       self._work_handle)  # fmt: skip
+        wrenches = surrogate_wrenches if self.is_surrogate else wheel_wrenches
+        wrenches(contact, motions, rows, counts, np.zeros((1, 2)), np.zeros((1, 2, 6)), self._counters,
+                 self._work_handle)  # fmt: skip
         for one in rows[0, wheel, : counts[0, wheel]]:
             a, b, x = float(one[columns.SEMI_A]), float(one[columns.SEMI_B]), float(one[columns.X])
-            one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
+            if self.is_elliptic:
+                one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
             yield Found(one, (x - a, x + a, 2.0 * b), float(one[columns.NORMAL]), float(one[columns.XI]))
 
     def _on_strips(self, contact, left, pose, motion, friction, fields, warm=False):
@@ -350,7 +358,7 @@ class LoadedWheels:
         forces), sought near ``guess`` (m); NaN where there is none.
         """
         goal = load ** (2.0 / 3.0)
-        solved = not self._still.strips.strips and rolling is None and vertical  # by Hertz's law at rest
+        solved = self.is_elliptic and rolling is None and vertical  # by Hertz's law at rest
 
         def excess(z):
             force = carried(self.at_height(side, y, z, roll, yaw, rolling, friction), vertical)
@@ -368,7 +376,7 @@ class LoadedWheels:
         """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
         roll, z = settle(self.geometry, self.geometry, self._still.hertz, self.modulus, y, yaw, self.spatial,
                          self._still.reduction, load, self.geometry.rolling_radius)  # fmt: skip
-        if math.isnan(z) or (not self._still.strips.strips and rolling is None and vertical):
+        if math.isnan(z) or (self.is_elliptic and rolling is None and vertical):
             return roll if not math.isnan(z) else math.nan, z
         return self._levelled(roll, z, y, load, yaw, rolling, friction, vertical)
 

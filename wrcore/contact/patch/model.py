@@ -12,10 +12,15 @@ from wrcore.contact.patch.rolling import LEVELS, Level, RollingWork, rolling_wor
 from wrcore.contact.patch.solve import STRIP_ROWS, SUMS
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, NormalWork, normal_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.surrogate.network import no_surrogate
+from wrcore.contact.surrogate.scratch import SurrogateScratch, surrogate_scratch
 from wrcore.errors import InputError, one_of
 
-PATCHES = ("maximum", "moment", "exact", "tabulated")
-"""Patch models by name: two reductions to an ellipse, exact strips, and these looked up."""
+PATCHES = ("maximum", "moment", "exact", "tabulated", "surrogate")
+"""Patch models by name: two reductions to an ellipse, exact strips, these looked up, and a trained network of them."""
+
+STRIPS = "exact", "tabulated"
+"""Those that solve patches on strips, in a run or before it."""
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
@@ -120,6 +125,7 @@ class StripWork(NamedTuple):
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
+    surrogate: SurrogateScratch
 
 
 def _no_library(nu, level=Level(0, 0, 0, 0)):  # noqa: B008  a tuple
@@ -140,7 +146,7 @@ def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0
 
 @lru_cache(maxsize=8)
 def _strip_model(patch, resolution, slip, nu, friction):
-    if patch in ("maximum", "moment"):
+    if patch not in STRIPS:
         return StripModel(0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
     level = LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
@@ -157,9 +163,9 @@ def with_tables(model):
     return model._replace(values=influence_table(), **libraries)
 
 
-def strip_work(model, wheelsets, slips=1):
+def strip_work(model, wheelsets, slips=1, surrogate=None):
     """Scratch arrays for a `StripModel`, a number of wheelsets, and so many ``slips`` of a patch at once; next to
-    nothing where patches are ellipses."""
+    nothing where patches are ellipses. ``surrogate``: the trained network, if the scene has one."""
     count, wheels, normal = MAX_STRIPS, (wheelsets, 2, MAX_PATCHES), normal_work()
     if not model.strips:
         count, wheels = 1, (0, 0, 0)
@@ -174,4 +180,5 @@ def strip_work(model, wheelsets, slips=1):
         *(np.zeros(shape if model.looked_up else (0, 0)) for shape in ((5, NODES), (4, NUMBERS), (8, 3), (10, 4))),
         np.zeros((3, 5)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
+        surrogate_scratch(no_surrogate() if surrogate is None else surrogate),
     )  # fmt: skip

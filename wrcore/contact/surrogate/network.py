@@ -1,0 +1,190 @@
+"""The network of the surrogate: three hidden layers.
+
+Weights are kept in single precision, and evaluated in double precision: an implicit method takes differences of
+contact forces, which the rounding of single precision would spoil.
+
+Activation x (1 + x / sqrt(x^2 + 4)) / 2: smooth, with a square root in place of an exponential. Inputs are shifted,
+scaled, and compressed by x / (1 + x^2)^(1/4), which grows with the square root of a large input.
+"""
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS
+from wrcore.kernels.jit import FAST, FUSED, jit
+
+N_CORRECTIONS = 8
+"""ln N, ln a, ln b, ln p_max, place along and across the patch over l, contact angle (rad), height over l: what the
+network adds to the contact of a parabolic overlap and to the parabolas of `PatchShape`."""
+
+FORCE_CELLS = 36
+"""Cells, in each direction, of the splines of force modes over the disk of creepages."""
+
+_WEIGHTS = Path(__file__).with_name("weights.npz")
+
+
+class Surrogate(NamedTuple):
+    """Arrays of a trained network, for kernels; all empty in a scene without it."""
+
+    median: np.ndarray
+    scale: np.ndarray
+    """(N_DESCRIPTORS,): shift and scale of the descriptors."""
+    least: np.ndarray
+    greatest: np.ndarray
+    """(N_DESCRIPTORS,): range of 99.8 % of the training data."""
+    weights_1: np.ndarray
+    biases_1: np.ndarray
+    weights_2: np.ndarray
+    biases_2: np.ndarray
+    weights_3: np.ndarray
+    biases_3: np.ndarray
+    weights_4: np.ndarray
+    biases_4: np.ndarray
+    """(inputs, outputs) and (outputs,) of the layers; the outputs of the last one are the corrections
+    (N_CORRECTIONS) and the coefficients of the force modes."""
+    corrections: np.ndarray
+    """(N_CORRECTIONS,): scales of the corrections."""
+    modes: np.ndarray
+    """(FORCE_CELLS + 2, FORCE_CELLS + 2, 3, modes) float32: coefficients of quadratic B-splines of the force modes over
+    the disk of creepages, for Fx and Fy (over friction times N) and Mz (over friction times N times c)."""
+
+
+class SurrogateWork(NamedTuple):
+    """Scratch arrays of the network."""
+
+    descriptors: np.ndarray
+    """(N_DESCRIPTORS,)."""
+    layer: np.ndarray
+    next_layer: np.ndarray
+    """(widest layer,)."""
+    outputs: np.ndarray
+    """(outputs,)."""
+
+
+def no_surrogate():
+    """`Surrogate` of a scene without it."""
+    none = np.zeros(0)
+    return Surrogate(*[none] * 4, *[np.zeros((0, 0)), none] * 4, none, np.zeros((0,) * 4, np.float32))
+
+
+def surrogate_work(surrogate):
+    """`SurrogateWork` of a `Surrogate`."""
+    width = max(N_DESCRIPTORS, len(surrogate.biases_1))
+    return SurrogateWork(np.zeros(N_DESCRIPTORS), np.zeros(width), np.zeros(width), np.zeros(len(surrogate.biases_4)))
+
+
+@cache
+def load_surrogate():
+    """The trained network that comes with the package, see weights.md beside it."""
+    with np.load(_WEIGHTS, allow_pickle=False) as file:
+        z = {name: file[name] for name in file.files}
+    layers = [z[f"{kind}_{k}"] for k in range(1, 5) for kind in ("weights", "biases")]
+    layers = [np.ascontiguousarray(layer, float) for layer in layers]
+    return Surrogate(
+        *(z[name].astype(float) for name in ("median", "scale", "least", "greatest")), *layers,
+        z["corrections"].astype(float), _mode_splines(z),
+    )  # fmt: skip
+
+
+def _activation(x):
+    return 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0))
+
+
+def force_modes(z, p, q):
+    """Force modes at places (n,) in the disk of creepages, shape (n, 3, modes), by the network that defines them: the
+    arrays ``z`` with the names mode_weights_k and mode_biases_k."""
+    x = np.stack([2 * p, 2 * q, 2 * p * p, 2 * q * q, 2 * p * q], -1)
+    for k in (1, 2, 3):
+        x = x @ z[f"mode_weights_{k}"].astype(float) + z[f"mode_biases_{k}"]
+        x = _activation(x) if k < 3 else x
+    return x.reshape(len(p), 3, -1) * z["force_scales"].astype(float)[:, None]
+
+
+def _mode_splines(z):
+    """Coefficients of the force modes' quadratic B-splines with equal steps from -1 to 1."""
+    nodes = (np.arange(FORCE_CELLS) + 0.5) * 2.0 / FORCE_CELLS - 1.0  # centres of cells, and both ends
+    nodes = np.concatenate([[-1.0], nodes, [1.0]])
+    p, q = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
+    values = force_modes(z, p, q).reshape(len(nodes), len(nodes), 3, -1)
+    knots = (np.arange(-2, FORCE_CELLS + 3)) * 2.0 / FORCE_CELLS - 1.0
+    along = make_interp_spline(nodes, values, k=2, t=knots, axis=0).c
+    both = make_interp_spline(nodes, np.moveaxis(along, 1, 0), k=2, t=knots, axis=0).c
+    return np.ascontiguousarray(np.moveaxis(both, 0, 1), np.float32)
+
+
+@jit(allocates=False, fastmath=FAST)
+def _dense(inputs, weights, biases, outputs, bend):
+    """One layer; ``bend``: with the activation. Four inputs at a time: outputs are read and written a quarter as
+    often."""
+    rows, n = weights.shape
+    for j in range(n):
+        outputs[j] = biases[j]
+    for i in range(0, rows - rows % 4, 4):
+        a, b, c, d = inputs[i], inputs[i + 1], inputs[i + 2], inputs[i + 3]
+        of_a, of_b, of_c, of_d = weights[i], weights[i + 1], weights[i + 2], weights[i + 3]
+        for j in range(n):
+            outputs[j] += (a * of_a[j] + b * of_b[j]) + (c * of_c[j] + d * of_d[j])
+    for i in range(rows - rows % 4, rows):
+        a, of_a = inputs[i], weights[i]
+        for j in range(n):
+            outputs[j] += a * of_a[j]
+    if bend:
+        for j in range(n):
+            x = outputs[j]
+            outputs[j] = 0.5 * x * (1.0 + x / math.sqrt(x * x + 4.0))
+
+
+@jit(allocates=False, fastmath=FUSED)
+def trust_in(surrogate, descriptors):
+    """Share of the network's outputs that counts: 1 in the range of the training, falling smoothly to 0 beyond it.
+
+    Each descriptor counts by the square of how far it is outside, over the width of its range."""
+    outside = 0.0
+    for i in range(N_DESCRIPTORS):
+        least, greatest = surrogate.least[i], surrogate.greatest[i]
+        excess = max(least - descriptors[i], descriptors[i] - greatest, 0.0) / (greatest - least)
+        outside += excess * excess
+    rest = max(1.0 - outside, 0.0)
+    return rest * rest
+
+
+@jit(allocates=False, fastmath=FUSED)
+def run_network(surrogate, work):
+    """Fill ``work.outputs`` from ``work.descriptors``, and return the share of them that counts (`trust_in`)."""
+    for i in range(N_DESCRIPTORS):
+        x = (work.descriptors[i] - surrogate.median[i]) / surrogate.scale[i]
+        work.layer[i] = x / math.sqrt(math.sqrt(1.0 + x * x))
+    _dense(work.layer, surrogate.weights_1, surrogate.biases_1, work.next_layer, True)
+    _dense(work.next_layer, surrogate.weights_2, surrogate.biases_2, work.layer, True)
+    _dense(work.layer, surrogate.weights_3, surrogate.biases_3, work.next_layer, True)
+    _dense(work.next_layer, surrogate.weights_4, surrogate.biases_4, work.outputs, False)
+    trust = trust_in(surrogate, work.descriptors)
+    for k in range(len(work.outputs)):
+        work.outputs[k] *= trust
+    return trust
+
+
+@jit(allocates=False, fastmath=FAST)
+def force_remainder(surrogate, outputs, p, q):
+    """Fx, Fy (over friction times N) and Mz (over friction times N times c) that the force modes add at a place in the
+    disk of creepages."""
+    u, v = 0.5 * (p + 1.0) * FORCE_CELLS, 0.5 * (q + 1.0) * FORCE_CELLS
+    i, j = min(max(int(u), 0), FORCE_CELLS - 1), min(max(int(v), 0), FORCE_CELLS - 1)
+    f, g = u - i, v - j
+    fx = fy = mz = 0.0
+    for r in range(3):
+        a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
+        for s in range(3):
+            b = 0.5 * (1.0 - g) * (1.0 - g) if s == 0 else 0.5 + g * (1.0 - g) if s == 1 else 0.5 * g * g
+            modes, factor = surrogate.modes[i + r, j + s], a * b
+            x = y = z = 0.0
+            for m in range(modes.shape[1]):
+                c = outputs[N_CORRECTIONS + m]
+                x, y, z = x + c * modes[0, m], y + c * modes[1, m], z + c * modes[2, m]
+            fx, fy, mz = fx + factor * x, fy + factor * y, mz + factor * z
+    return fx, fy, mz
