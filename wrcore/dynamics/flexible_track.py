@@ -156,7 +156,7 @@ def _find_wrenches(model, state, work, mode):
             elif not given:
                 scratch.speeds[k, i] = 0.0
     c = work.counters
-    counted = c[0], c[1], c[2], c[3], c[4]
+    counted = c[0], c[1], c[2], c[3], c[4], c[5]
     _press(model, work, -1, mode)
     if massless and given:
         _step_on(model, state, work)

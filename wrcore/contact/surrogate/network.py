@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS
 from wrcore.kernels.jit import FAST, FUSED, jit
@@ -107,6 +106,8 @@ def force_modes(z, p, q):
 
 def _mode_splines(z):
     """Coefficients of the force modes' quadratic B-splines with equal steps from -1 to 1."""
+    from scipy.interpolate import make_interp_spline  # takes long to import
+
     nodes = (np.arange(FORCE_CELLS) + 0.5) * 2.0 / FORCE_CELLS - 1.0  # centres of cells, and both ends
     nodes = np.concatenate([[-1.0], nodes, [1.0]])
     p, q = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
