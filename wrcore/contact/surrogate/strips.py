@@ -1,7 +1,8 @@
 """Strips of the wheel across one contact patch, and what the surrogate needs to know of each.
 
-The strips stand at the nodes of the wheel profile. A tread has more nodes than its integrals need; there every fourth
-node is taken (:func:`wrcore.contact.moved.smooth_nodes`).
+The strips stand at nodes of the wheel profile: at every fourth one on a tread
+(:func:`wrcore.contact.moved.smooth_nodes`), and of these again at every second or fourth one where an overlap is so
+wide that 32 strips or more are left.
 """
 
 import math
@@ -28,6 +29,9 @@ from wrcore.kernels.jit import FAST, FUSED, jit
 
 MOST_STRIPS = 1024
 """Most strips of one patch; at 0.1 mm a patch is at most 60 mm wide."""
+
+ENOUGH = 64
+"""Nodes beyond which every second one is left out."""
 
 _END_STRIPS = 16
 """Places kept for the ends of overlaps."""
@@ -67,18 +71,19 @@ def new_strips():
     return Strips(*(np.zeros(MOST_STRIPS) for _ in Strips._fields))
 
 
-@jit(allocates=False, fastmath=FAST)
-def _fill_nodes(nodes, wheel, rail, pose, reach, strips):
-    """Fill ``strips`` but for arc and weight at the nodes; ``reach``: from the centre to the first node along the axle,
-    m."""
-    grid, n = nodes.grid, nodes.end
+@jit(allocates=False, forceinline=True, fastmath=FAST)
+def _fill_nodes(nodes, first, stride, wheel, rail, pose, reach, strips):
+    """Fill ``strips`` but for arc and weight at every ``stride``-th node from the ``first`` one on; ``reach``: from the
+    wheelset's centre to node 0 along the axle, m. Returns their number."""
+    grid, n = nodes.grid, (nodes.end - first + stride - 1) // stride
     square, turned = grid.tilt_square, pose.tilt * pose.q
     for k in range(n):
-        node, cell = np.uint64(grid.node + k), np.uint64(grid.cell + k)
+        i = first + stride * k
+        node, cell = np.uint64(grid.node + i), np.uint64(grid.cell + i)
         radius, along = max(wheel[RADIUS, node], 1e-3), wheel[ALONG, node]  # 0 beyond the profile
         down = radius - square * (wheel[DOWN_2, node] + square * (wheel[DOWN_4, node] + square * wheel[DOWN_6, node]))
-        d = grid.lateral + k * grid.lateral_rate + down * grid.y_down + along * grid.y_along
-        height = grid.height + k * grid.height_rate + down * grid.z_down + along * grid.z_along
+        d = grid.lateral + i * grid.lateral_rate + down * grid.y_down + along * grid.y_along
+        height = grid.height + i * grid.height_rate + down * grid.z_down + along * grid.z_along
         c1, c2, c3 = rail[1, cell], rail[2, cell], rail[3, cell]
         rail_slope = c1 + d * (2.0 * c2 + d * (3.0 * c3))
         slope = along / radius
@@ -97,16 +102,18 @@ def _fill_nodes(nodes, wheel, rail, pose, reach, strips):
         strips.gap[k] = height - (rail[0, cell] + d * (c1 + d * (c2 + d * c3)))
         strips.angle[k] = 4.0 * quarter * series
         strips.cosine[k], strips.curvature[k] = cosine, 0.5 * cosine / radius
-        strips.ahead[k] = turned * along + (reach + nodes.step * k) * pose.ex
-        strips.lateral[k] = nodes.ur + nodes.step * k + d
+        strips.ahead[k] = turned * along + (reach + nodes.step * i) * pose.ex
+        strips.lateral[k] = nodes.ur + nodes.step * i + d
         strips.height[k] = height - pose.z
+    return n
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _fill_one_by_one(geometry, nodes, pose, strips):
+def _fill_one_by_one(geometry, nodes, first, stride, pose, strips):
     """The same for any pose, and for rails that change along the track or wheels out of round; some times as slow."""
-    for k in range(nodes.end):
-        u = nodes.u + nodes.step * k
+    n = (nodes.end - first + stride - 1) // stride
+    for k in range(n):
+        u = nodes.u + nodes.step * (first + stride * k)
         ur, height, radius, slope, _, along = strip_point(geometry, pose, u)
         rail, rail_slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
         tangent = 0.5 * (rail_slope + wheel_slope(pose, slope, along))
@@ -117,6 +124,7 @@ def _fill_one_by_one(geometry, nodes, pose, strips):
         strips.curvature[k] = with_rail_along(geometry, BEND, ur, cosine, 0.5 * cosine / radius)
         strips.ahead[k] = with_rail_along(geometry, AHEAD, ur, 1.0, ahead)
         strips.height[k] = with_rail_along(geometry, LIFT, ur, 1.0, height) - pose.z
+    return n
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -144,19 +152,25 @@ def fill_strips(geometry, pose, row, low, high, strips):
 
     ``row`` is one of its overlaps (a row of patches, overwritten in OUTSIDE and BEYOND). Returns the number of strips,
     and of those the number at nodes, which come first; 0 if there are fewer than three nodes."""
-    margin = 4.0 * geometry.wheel_step
+    step = geometry.wheel_step
+    margin = 4.0 * step if high - low < 0.75 * ENOUGH * step else 16.0 * step  # a node beyond each end
     row[OUTSIDE], row[BEYOND] = low - margin, high + margin
     nodes, wheel, rail = smooth_nodes(geometry, pose, row)
-    n = nodes.end
-    if n < 3 or n > MOST_STRIPS - _END_STRIPS:
+    stride = 1 if nodes.end <= ENOUGH else 2 if nodes.end <= 2 * ENOUGH else 4
+    first = -nodes.grid.node % stride  # always the same nodes of the wheel
+    if nodes.end < 3 or nodes.end > 4 * (MOST_STRIPS - _END_STRIPS):
         return 0, 0
-    is_planar = pose.tilt == 0.0 and pose.ex != 0.0
+    is_planar, reach = pose.tilt == 0.0 and pose.ex != 0.0, geometry.half_distance + nodes.u
     if is_planar or changes_along(geometry) or leaves_cells(pose):
-        _fill_one_by_one(geometry, nodes, pose, strips)
+        n = _fill_one_by_one(geometry, nodes, first, stride, pose, strips)
+    elif stride == 1:
+        n = _fill_nodes(nodes, 0, 1, wheel, rail, pose, reach, strips)
+    elif stride == 2:
+        n = _fill_nodes(nodes, first, 2, wheel, rail, pose, reach, strips)
     else:
-        _fill_nodes(nodes, wheel, rail, pose, geometry.half_distance + nodes.u, strips)
+        n = _fill_nodes(nodes, first, 4, wheel, rail, pose, reach, strips)
     for k in range(n):
-        u = nodes.u + nodes.step * k
+        u = nodes.u + nodes.step * (first + stride * k)
         if not low < u < high:
             strips.gap[k] = max(strips.gap[k], 0.0)
     strips.arc[0] = 0.0
