@@ -1,17 +1,19 @@
 """Looked-up beside exact contact where runs pass."""
 
 import numpy as np
+import pytest
 
 from study.patch.look_up_errors import errors
 from study.patch.visited_errors import PAIRS, SCENES, visited, with_hollow
 from wrcore.contact import reduction
 
 
-def test_both_models_at_the_states_of_a_run():
+@pytest.mark.parametrize("patch", ["tabulated", "surrogate"])
+def test_both_models_at_the_states_of_a_run(patch):
     scene, changes, _ = SCENES["hunting"]
-    rows, solved = visited(scene, changes, 0.2, 5)
-    assert len(solved) == len(rows["exact"]) == len(rows["tabulated"]) == 10 and not solved.any()
-    found = errors(rows["exact"], rows["tabulated"])
+    rows, outside = visited(scene, changes, 0.2, 5, judged=patch)
+    assert len(outside) == len(rows["exact"]) == len(rows[patch]) == 10 and not outside.any()
+    found = errors(rows["exact"], rows[patch])
     assert 0.0 < found["N"].max() < 0.5 and found["F"].max() < 1.5
     assert np.ptp(rows["exact"][:, reduction.NORMAL]) > 100.0  # not always the same
 

@@ -1,9 +1,10 @@
-"""How far contact that is looked up is from the exact solver where runs pass: ``python -m study.patch.visited_errors``.
+"""How far a patch model is from the exact solver where runs pass: ``python -m study.patch.visited_errors``.
 
-Each scene runs with ``tabulated``; at equally spaced times both models are evaluated at the run's state, so that wheels
-have the same place and motion. Errors of each wheel's heaviest patch, at 50, 95 and 100 %: of N (%), of the creep force
-over mu N (%), of its moment over mu N c (%) and of p_max (%). ``solved``: share of wheels that the table left to the
-solver.
+Each scene runs with the model, ``tabulated`` or another one (``--patch``); at equally spaced times both models are
+evaluated at the run's state, so that wheels have the same place and motion. Errors of each wheel's heaviest patch, at
+50, 95 and 100 %: of N (%), of the creep force over mu N (%), of its moment over mu N c (%) and of p_max (%).
+``outside``: share of wheels that the table left to the solver, which do not count in the errors, or that lie outside
+the surrogate's training, which do.
 """
 
 import argparse
@@ -17,9 +18,9 @@ import wrcore as wr
 from study.patch.look_up import CURVE, ROUGH
 from study.patch.look_up_errors import errors, worn
 from wrcore.contact import reduction
-from wrcore.contact.patch.model import RESOLUTIONS
+from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, STRIPS
 from wrcore.dynamics.system import Equations
-from wrcore.dynamics.wheel import SOLVED
+from wrcore.dynamics.wheel import OUTSIDE_TRAINING, SOLVED
 from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene, load_scene
 
@@ -65,18 +66,19 @@ def with_hollow(changes, folder):
     return changes | {"wheel.profile": {"points": str(path)}}
 
 
-def visited(scene, changes, duration, count, resolution="middle"):
-    """Rows of both models, and which of them were solved, of a run at ``count`` times, looked up at a resolution."""
+def visited(scene, changes, duration, count, resolution="middle", judged="tabulated"):
+    """Rows of both models, and which of them were outside, of a run at ``count`` times with a patch model that is
+    ``judged``, looked up at a resolution."""
     models = {}
-    for patch, level in (("tabulated", resolution), ("exact", "middle")):
-        contact = {"contact.patch": patch, "contact.resolution": level}
+    for patch, level in ((judged, resolution), ("exact", "middle")):
+        contact = {"contact.patch": patch} | ({"contact.resolution": level} if patch in STRIPS else {})
         models[patch], start = compile_scene(load_scene(wr.example(scene), {**contact, **changes}))
     times = np.linspace(0.0, duration, count)
-    states = integrate(models["tabulated"], start, times, "rodas5", 1e-4, 1e-7).states
+    states = integrate(models[judged], start, times, "rodas5", 1e-4, 1e-7).states
     equations = {patch: Equations(model) for patch, model in models.items()}
-    rows, solved = {patch: [] for patch in models}, []
+    rows, outside, counter = {patch: [] for patch in models}, [], SOLVED if judged in STRIPS else OUTSIDE_TRAINING
     for t, state in zip(times, states, strict=False):
-        before = equations["tabulated"].work.counters[SOLVED]
+        before = equations[judged].work.counters[counter]
         for one in equations.values():
             one(t, state)
         works = [equations[patch].work for patch in models]
@@ -85,8 +87,8 @@ def visited(scene, changes, duration, count, resolution="middle"):
             for patch, work in zip(models, works, strict=True):
                 own = work.patches[k, wheel, : work.counts[k, wheel]]
                 rows[patch].append(own[own[:, reduction.NORMAL].argmax()].copy())
-        solved += [works[0].counters[SOLVED] > before] * int(touching.sum())
-    return {patch: np.array(found) for patch, found in rows.items()}, np.array(solved)
+        outside += [works[0].counters[counter] > before] * int(touching.sum())
+    return {patch: np.array(found) for patch, found in rows.items()}, np.array(outside)
 
 
 def main():
@@ -96,18 +98,19 @@ def main():
     parser.add_argument("scenes", nargs="*", default=list(SCENES), help="some of: " + ", ".join(every))
     parser.add_argument("--pairs", nargs="*", default=list(PAIRS), help="some of: " + "; ".join(PAIRS))
     parser.add_argument("--resolution", choices=RESOLUTIONS, default="middle", help="of what is looked up")
+    parser.add_argument("--patch", choices=[patch for patch in PATCHES if patch != "exact"], default="tabulated")
     parser.add_argument("--count", type=int, default=100, help="of times in a run")
     chosen = parser.parse_args()
     for pair in chosen.pairs:
         for name in chosen.scenes:
             scene, settings, duration = every[name]
             with tempfile.TemporaryDirectory() as folder:
-                rows, solved = visited(
-                    scene, settings | with_hollow(PAIRS[pair], folder), duration, chosen.count, chosen.resolution
-                )
-            found = errors(rows["exact"][~solved], rows["tabulated"][~solved])
+                changes = settings | with_hollow(PAIRS[pair], folder)
+                rows, outside = visited(scene, changes, duration, chosen.count, chosen.resolution, chosen.patch)
+            counted = ~outside if chosen.patch in STRIPS else slice(None)
+            found = errors(rows["exact"][counted], rows[chosen.patch][counted])
             told = {name: "/".join(f"{q:.2g}" for q in np.percentile(e, [50, 95, 100])) for name, e in found.items()}
-            line = {"pair": pair, "run": name, "wheels": len(solved), "solved, %": 100.0 * solved.mean(), **told}
+            line = {"pair": pair, "run": name, "wheels": len(outside), "outside, %": 100.0 * outside.mean(), **told}
             print(pd.DataFrame([line]).to_markdown(index=False, floatfmt=".3g"), flush=True)
 
 
