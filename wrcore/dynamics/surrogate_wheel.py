@@ -80,7 +80,7 @@ class Pressed(NamedTuple):
     angle: float
     """Contact angle, rad."""
     trust: float
-    """Share of the network's outputs that counts, 1 in the range of its training."""
+    """Share of the network's outputs that counts, 1 in the range of its training and near it."""
 
 
 _NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

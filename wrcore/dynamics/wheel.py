@@ -22,7 +22,7 @@ from wrcore.kernels.jit import FUSED, jit
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
 """Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
 pair's table that were solved instead of looked up, patches on fixed strips, whose tips were not found, and patches of
-the surrogate outside the range of its training."""
+the surrogate far outside the range of its training."""
 
 COUNTERS = 6
 

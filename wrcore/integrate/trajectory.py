@@ -70,6 +70,6 @@ class Trajectory:
     not_tabulated: int = 0
     """Patches that were to be looked up and had to be solved."""
     outside_training: int = 0
-    """Patches of the surrogate whose form was outside the range of its training."""
+    """Patches of the surrogate whose form was far outside the range of its training."""
     unbalanced: int = 0
     """Evaluations in which rails without mass found no balance."""

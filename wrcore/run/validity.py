@@ -83,7 +83,7 @@ MEANINGS = {
     "patches_on_grid": "a patch of `exact` for which no strips converged: solved on a uniform grid",
     "patches_on_fixed_strips": "a patch of `exact` for which no strips end at its tips: solved on fixed strips",
     "patches_not_tabulated": "a patch of `tabulated` outside its table: solved directly, at the price of `exact`",
-    "patches_outside_training": "a patch of `surrogate` whose form is outside the range of its training: what the "
+    "patches_outside_training": "a patch of `surrogate` whose form is far outside the range of its training: what the "
     "network adds to an ellipse is reduced there",
     "rails_unbalanced": "an evaluation in which [rails without mass](tracks.md) found no balance of spring, damper and "
     "wheel; the last try is taken",

@@ -55,7 +55,7 @@ def test_trust_falls_smoothly_beyond_the_training(surrogate):
     width = surrogate.greatest - surrogate.least
     for i in range(N_DESCRIPTORS):
         descriptors, trusts = surrogate.median.copy(), []
-        for beyond in np.linspace(-0.1, 1.5, 161):
+        for beyond in np.linspace(0.9, 2.5, 161):
             descriptors[i] = surrogate.greatest[i] + beyond * width[i]
             trusts.append(network.trust_in(surrogate, descriptors))
         assert trusts[0] == 1.0 and trusts[-1] == 0.0

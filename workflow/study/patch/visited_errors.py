@@ -1,8 +1,10 @@
 """How far a patch model is from the exact solver where runs pass: ``python -m study.patch.visited_errors``.
 
 Each scene runs with the model, ``tabulated`` or another one (``--patch``); at equally spaced times both models are
-evaluated at the run's state, so that wheels have the same place and motion. Errors of each wheel's heaviest patch, at
-50, 95 and 100 %: of N (%), of the creep force over mu N (%), of its moment over mu N c (%) and of p_max (%).
+evaluated at the run's state, so that wheels have the same place and motion. Errors at 50, 95 and 100 %: of N (%), of
+the creep force over mu N (%), of its moment over mu N c (%) and of p_max (%) of each wheel's heaviest patch; of the
+force on the wheel along the normal of that patch (%) and across it, over mu N (%), which also tells of wheels whose
+patches one model puts together and the other one does not.
 ``outside``: share of wheels that the table left to the solver, which do not count in the errors, or that lie outside
 the surrogate's training, which do.
 """
@@ -16,7 +18,7 @@ import pandas as pd
 
 import wrcore as wr
 from study.patch.look_up import CURVE, ROUGH
-from study.patch.look_up_errors import errors, worn
+from study.patch.look_up_errors import FRICTION, errors, worn
 from wrcore.contact import reduction
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, STRIPS
 from wrcore.dynamics.system import Equations
@@ -67,8 +69,8 @@ def with_hollow(changes, folder):
 
 
 def visited(scene, changes, duration, count, resolution="middle", judged="tabulated"):
-    """Rows of both models, and which of them were outside, of a run at ``count`` times with a patch model that is
-    ``judged``, looked up at a resolution."""
+    """Rows of both models, their forces on the wheels (N), and which of them were outside, of a run at ``count`` times
+    with a patch model that is ``judged``, looked up at a resolution."""
     models = {}
     for patch, level in ((judged, resolution), ("exact", "middle")):
         contact = {"contact.patch": patch} | ({"contact.resolution": level} if patch in STRIPS else {})
@@ -76,7 +78,8 @@ def visited(scene, changes, duration, count, resolution="middle", judged="tabula
     times = np.linspace(0.0, duration, count)
     states = integrate(models[judged], start, times, "rodas5", 1e-4, 1e-7).states
     equations = {patch: Equations(model) for patch, model in models.items()}
-    rows, outside, counter = {patch: [] for patch in models}, [], SOLVED if judged in STRIPS else OUTSIDE_TRAINING
+    rows, forces, outside = {patch: [] for patch in models}, {patch: [] for patch in models}, []
+    counter = SOLVED if judged in STRIPS else OUTSIDE_TRAINING
     for t, state in zip(times, states, strict=False):
         before = equations[judged].work.counters[counter]
         for one in equations.values():
@@ -87,8 +90,19 @@ def visited(scene, changes, duration, count, resolution="middle", judged="tabula
             for patch, work in zip(models, works, strict=True):
                 own = work.patches[k, wheel, : work.counts[k, wheel]]
                 rows[patch].append(own[own[:, reduction.NORMAL].argmax()].copy())
+                forces[patch].append(work.rail_wrenches[k, wheel, :3].copy())
         outside += [works[0].counters[counter] > before] * int(touching.sum())
-    return {patch: np.array(found) for patch, found in rows.items()}, np.array(outside)
+    rows, forces = ({patch: np.array(found) for patch, found in both.items()} for both in (rows, forces))
+    return rows, forces, np.array(outside)
+
+
+def wheel_errors(angle, exact, judged):
+    """Columns of errors in % of forces (n, 3) on wheels, along the normal at a contact angle (n,), and across it."""
+    normal = np.column_stack([0.0 * angle, -np.sin(angle), np.cos(angle)])
+    load, missed = (exact * normal).sum(axis=1), judged - exact
+    along = (missed * normal).sum(axis=1)
+    across = np.linalg.norm(missed - along[:, None] * normal, axis=1)
+    return {"wheel, along": 100.0 * abs(along) / load, "wheel, across": 100.0 * across / (FRICTION * load)}
 
 
 def main():
@@ -106,9 +120,11 @@ def main():
             scene, settings, duration = every[name]
             with tempfile.TemporaryDirectory() as folder:
                 changes = settings | with_hollow(PAIRS[pair], folder)
-                rows, outside = visited(scene, changes, duration, chosen.count, chosen.resolution, chosen.patch)
+                rows, forces, outside = visited(scene, changes, duration, chosen.count, chosen.resolution, chosen.patch)
             counted = ~outside if chosen.patch in STRIPS else slice(None)
-            found = errors(rows["exact"][counted], rows[chosen.patch][counted])
+            exact, judged = rows["exact"][counted], rows[chosen.patch][counted]
+            on_wheels = forces["exact"][counted], forces[chosen.patch][counted]
+            found = errors(exact, judged) | wheel_errors(exact[:, reduction.ANGLE], *on_wheels)
             told = {name: "/".join(f"{q:.2g}" for q in np.percentile(e, [50, 95, 100])) for name, e in found.items()}
             line = {"pair": pair, "run": name, "wheels": len(outside), "outside, %": 100.0 * outside.mean(), **told}
             print(pd.DataFrame([line]).to_markdown(index=False, floatfmt=".3g"), flush=True)
