@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba.core.caching import NullCache
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.errors import TypingError
 
@@ -22,7 +21,6 @@ from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
 from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.kernels.named_laws import _without_cache
 
 
 @jit(allocates=False)
@@ -131,23 +129,11 @@ def test_helpers_have_the_flags_of_their_kernel_whoever_came_first(flags):
     assert number[True][0] > 0 == number[True][1] and number[False][1] > 0 == number[False][0]
 
 
-def test_a_kernel_is_handed_to_numba_when_somebody_asks_for_it():
-    kernel = jit(allocates=False)(half.py_func)
-    assert (kernel.__name__, kernel.__module__) == ("half", __name__) and "dispatcher" not in vars(kernel)
-    assert kernel(3.0) == 1.5 and "dispatcher" in vars(kernel) and len(kernel.overloads) == 1
-
-
-def test_a_kernel_in_the_text_of_a_law_loses_its_cache():
-    kernel = jit(allocates=False)(half.py_func)
-    _without_cache(kernel)
-    assert isinstance(kernel.dispatcher._cache, NullCache)
-
-
 def test_python_gets_no_wrapper_for_c():
     kernel, values = fresh(fill_halves), np.full(2, 3.0)
     kernel(values)
     names, _ = symbols(kernel)
-    assert values.tolist() == [1.5, 1.5] and isinstance(kernel.dispatcher, KernelDispatcher)
+    assert values.tolist() == [1.5, 1.5] and isinstance(kernel, KernelDispatcher)
     assert any("cpython" in name for name in names) and not any("cfunc" in name for name in names)
 
 
@@ -180,7 +166,7 @@ except ValueError as error:
 before = "scipy.linalg" in sys.modules
 out = [forms.squared(rows).tolist(), forms.factorial(5), said, before]
 kernels = (forms.squared, forms.halved, forms.half, forms.factorial)
-forms_of = [form for kernel in kernels for form in (kernel, *vars(kernel.dispatcher).get('forms', {}).values())]
+forms_of = [form for kernel in kernels for form in (kernel, *vars(kernel).get('forms', {}).values())]
 print(json.dumps([out, sum(sum(k.stats.cache_misses.values()) for k in forms_of)]))
 """
 

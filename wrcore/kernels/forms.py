@@ -10,7 +10,6 @@ Numba makes all of it for every kernel, with a wrapper for C besides. Most kerne
 import gc
 import os
 from contextlib import contextmanager, nullcontext
-from functools import cached_property, update_wrapper
 
 import numba
 from llvmlite import binding
@@ -279,30 +278,3 @@ class KernelDispatcher(CPUDispatcher):
     def add_overload(self, result):
         super().add_overload(result)
         _set_environments(result)
-
-
-class LateKernel:
-    """A kernel whose `KernelDispatcher` is made when somebody first calls it, or asks for anything of it.
-
-    A process imports some six hundred kernels and calls twenty. Numba makes a dispatcher in 0.1 ms, most of which it
-    takes to look at the signature."""
-
-    def __init__(self, function, settings):
-        self.py_func, self._settings = function, settings
-        update_wrapper(self, function)
-
-    @cached_property
-    def dispatcher(self):
-        """What numba knows the kernel by."""
-        dispatcher = numba.njit(self.py_func, pipeline_class=KernelCompiler, **self._settings)
-        dispatcher.__class__ = KernelDispatcher
-        return dispatcher
-
-    def __call__(self, *arguments, **named):
-        return self.dispatcher(*arguments, **named)
-
-    def __getattr__(self, name):
-        return getattr(self.dispatcher, name)
-
-    def __reduce__(self):
-        return self.dispatcher.__reduce__()

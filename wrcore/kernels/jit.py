@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 from numba.np import linalg
 
 from wrcore.errors import InputError
-from wrcore.kernels.forms import LateKernel
+from wrcore.kernels.forms import KernelCompiler, KernelDispatcher
 
 if numba.config.DISABLE_JIT:
     raise InputError("NUMBA_DISABLE_JIT", "", "expected it unset: kernels hand each other addresses of compiled code")
@@ -44,7 +44,9 @@ def jit(function=None, *, allocates=True, **options):
     settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}
     if not allocates:
         settings["_nrt"] = False
-    return LateKernel(function, settings)
+    dispatcher = numba.njit(function, pipeline_class=KernelCompiler, **settings)
+    dispatcher.__class__ = KernelDispatcher
+    return dispatcher
 
 
 @intrinsic

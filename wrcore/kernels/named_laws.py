@@ -252,7 +252,7 @@ def _without_cache(function):
     if hasattr(function, "py_func") and hasattr(function, "_cache"):
         from numba.core.caching import NullCache
 
-        getattr(function, "dispatcher", function)._cache = NullCache()  # of numba's kernels, or of wrcore's
+        function._cache = NullCache()
 
 
 def guarded(what: str, load: Callable[[], Any]) -> Any:

@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
 
 from wrcore.dynamics import constraints, wheel
 from wrcore.dynamics.system import workspace
 from wrcore.elements.law import LAW, LAWS
-from wrcore.kernels.forms import LateKernel
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
 """In the order in which they are added up."""
@@ -253,7 +253,7 @@ def interpreted(tally):
             new = value
             if (module.__name__, name) == ("wrcore.dynamics.suspension", "_by_law"):
                 new = _by_law
-            elif isinstance(value, LateKernel):
+            elif isinstance(value, Dispatcher):
                 new = value.py_func
             elif value is math:
                 new = mathematics
