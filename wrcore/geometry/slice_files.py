@@ -172,7 +172,8 @@ def _read_slcs(path, how, kind):
         stated = name.lower().endswith((".prr", ".prw"))
         columns = {**({} if stated else {"unit": unit, "downwards": True}), **how}
         rows.append((number, (value + offset) * unit_of_place, name, columns, places[k] if features else None))
-    told = f"{int(kinks)} kinks not kept (the surface stays smooth)" if kinks else ""
+    lost = [f"{int(number)} {what}" for number, what in ((kinks, "kinks"), (steps, "accelerations")) if number]
+    told = f"{' and '.join(lost)} not kept (the surface stays smooth)" if lost else ""
     return _assembled(path, [("", rows)], kind, told, method == 1)
 
 

@@ -176,11 +176,28 @@ def test_heads_begin_and_end_at_slices(tmp_path):
 
 SLCS = """ 0.0 1.0 U_OFFSET, U_SCALE
  2 NSLC
- {features} 0 0 NFEAT, NKINK, NACCEL
+ {features} {lost} NFEAT, NKINK, NACCEL
  1 U_INTPOL
  0.0 'a.txt'
  {second} 'a.txt'
 {places}"""
+
+
+def write_slcs(folder, **change):
+    """Write rail.slcs, of two equal sections."""
+    u = np.linspace(-30.0, 30.0, 121)
+    np.savetxt(folder / "a.txt", np.column_stack([u, u**2 / 600.0]))
+    fields = {"features": "0", "lost": "0 0", "second": "10.0", "places": ""} | change
+    (folder / "rail.slcs").write_text(SLCS.format(**fields))
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"), [("1 0", "1 kinks"), ("0 2", "2 accelerations"), ("1 2", "1 kinks and 2 acc")]
+)
+def test_slices_name_kinks_and_accelerations_that_are_not_kept(tmp_path, lost, said):
+    write_slcs(tmp_path, lost=lost, places="5.0\n" * np.count_nonzero([int(n) for n in lost.split()]))
+    source = read_slices(tmp_path / "rail.slcs").source
+    assert said in source and "not kept" in source
 
 
 @pytest.mark.parametrize(
@@ -196,9 +213,7 @@ SLCS = """ 0.0 1.0 U_OFFSET, U_SCALE
     ],
 )
 def test_faults_name_file_and_line(tmp_path, change, where, what):
-    u = np.linspace(-30.0, 30.0, 121)
-    np.savetxt(tmp_path / "a.txt", np.column_stack([u, u**2 / 600.0]))
-    (tmp_path / "rail.slcs").write_text(SLCS.format(**{"features": "0", "second": "10.0", "places": "", **change}))
+    write_slcs(tmp_path, **change)
     with pytest.raises(InputError) as error:
         read_slices(tmp_path / "rail.slcs")
     assert "rail.slcs" in str(error.value)

@@ -365,6 +365,7 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
             "scenes.0.set: .*crossing.yaml: expected rails and wheels that are the same everywhere",
         ),
         ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
+        ({"rails": {"tonnage": 1.0, "renewal": 1e7}}, "rails.renewal: expected less than the plan's distance"),
         ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),
         ({"law": ARCHARD, "set": {"contact.friction": {"left": 0.3, "right": 0.2}}}, "scenes.0.set: expected contact"),

@@ -71,6 +71,10 @@ def load_wear_plan(
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
     wear_law(data["law"], name)
+    renewal = data.get("rails", {}).get("renewal", 0.0)
+    if renewal >= data["distance"]:
+        expected = f"expected less than the plan's distance of {data['distance']:g} m, or no such key: rails are never"
+        raise InputError(name, "rails.renewal", f"{expected} renewed, got {renewal:g} m")
     scenes: list[Scene] = []
     output: dict[str, Any] = {"output.rate": data["rate"]}
     if data["patches"] == "exact":
