@@ -1,0 +1,229 @@
+"""Draw random contact patches and solve them exactly: training data of the surrogate.
+
+    python -m study.surrogate.patches FOLDER --count 100000 --seed 1
+
+writes shards FOLDER/patches-00000.npz and so on. A shard depends on the settings and its number alone. A run that was
+stopped continues where it is run again; several runs with --part 1/2 and --part 2/2 share the work. A larger --count
+adds shards.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import wrcore
+from study.surrogate import shards
+from study.surrogate.pairs import random_pair, read_measured
+from study.surrogate.positions import (
+    LOADS,
+    MOST_ANGLE,
+    TWINS,
+    choose,
+    choose_twins,
+    draw_positions,
+    random_friction,
+)
+from study.surrogate.solution import OVERLAPS, POINTS, ExactPatches, random_points
+from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
+from wrcore.errors import InputError
+
+PAIR_PATCHES = 40
+"""Patches of each pair of profiles."""
+
+SHARD_PATCHES = 400
+"""Patches of a shard: some 10 s of one processor core."""
+
+LEAST_DRAWN = 12
+"""Patches that a pair must have at its random positions to be used."""
+
+
+class Sampling(NamedTuple):
+    """Settings on which the content of a shard depends."""
+
+    seed: int
+    shard_patches: int = SHARD_PATCHES
+    candidates: int = 1
+    """Pairs that are drawn for each pair that is kept, the one farthest from the data that there is."""
+    is_solved: bool = True
+    """False: descriptors without the exact solution, for training with a teacher."""
+    measured: object = None
+    """`study.surrogate.pairs.Measured`, or None."""
+    reference: np.ndarray = np.zeros((0, 38))
+    """(n, N_DESCRIPTORS): descriptors from which distances count, beside those of the same shard."""
+
+
+def scaled_inputs(descriptors):
+    """Descriptors (n, N_DESCRIPTORS) shifted, scaled and compressed as the network of the package does."""
+    surrogate = load_surrogate()
+    x = (np.asarray(descriptors, float) - surrogate.median) * surrogate.per_scale
+    return x / (1.0 + x * x) ** 0.25
+
+
+def distances(descriptors, others):
+    """Distance (n,) of each row of scaled inputs to the nearest of ``others``; infinite where there are none."""
+    return cKDTree(others).query(descriptors)[0] if len(others) else np.full(len(descriptors), np.inf)
+
+
+class _Candidate(NamedTuple):
+    """A pair with its friction and the patches at its random positions."""
+
+    pair: object
+    exact: ExactPatches
+    drawn: list
+
+
+def _draw_candidate(random, sampling):
+    """A `_Candidate` that has enough patches."""
+    while True:
+        pair = random_pair(random, sampling.measured)
+        exact = ExactPatches(pair.on_rail.geometry, random_friction(random))
+        drawn = draw_positions(random, exact)
+        if len(drawn) >= LEAST_DRAWN:
+            return _Candidate(pair, exact, drawn)
+
+
+def _keep_farthest(random, sampling, known):
+    """Of some candidates the one whose patches are farthest from ``known`` scaled inputs, by their median distance, and
+    this distance."""
+    best, farthest = None, -1.0
+    for _ in range(sampling.candidates):
+        one = _draw_candidate(random, sampling)
+        if sampling.candidates == 1:
+            return one, np.nan
+        distance = float(np.median(distances(scaled_inputs([f.descriptors for f in one.drawn]), known)))
+        if distance > farthest:
+            best, farthest = one, distance
+    return best, farthest
+
+
+def _solved(random, exact, found, is_solved):
+    """Arrays of one patch by name; None where it has no solution in the range of the training."""
+    geometry, points = exact.model.geometry, random_points(random)
+    row = {
+        "descriptors": found.descriptors,
+        "position": found.position,
+        "radius": geometry.rolling_radius,
+        "half_distance": geometry.half_distance,
+        "rail_distance": geometry.rail_distance,
+        "friction": exact.model.friction,
+        "overlaps": found.numbers[OVERLAPS],
+    }
+    if not is_solved:
+        return row
+    solved = exact.solve(found, points)
+    if solved is None or not LOADS[0] < solved.load < LOADS[1] or abs(solved.angle) > MOST_ANGLE:
+        return None
+    names = "load", "angle", "corrections", "exact", "base", "disk"
+    return row | {name: getattr(solved, name) for name in names}
+
+
+def pair_patches(random, candidate, sampling, number):
+    """Rows (dict) of the patches of a pair, twins one after the other, and how many had no solution."""
+    exact, rows, failed = candidate.exact, [], 0
+    n = int(round(0.5 * TWINS * PAIR_PATCHES))
+    singles = choose(random, candidate.drawn, PAIR_PATCHES - 2 * n)
+    groups = [((one,), 0.0) for one in singles]
+    groups += [((one, twin), step) for one, twin, step in choose_twins(random, exact, candidate.drawn, n)]
+    for patches, step in groups:
+        solved = [_solved(random, exact, found, sampling.is_solved) for found in patches]
+        if any(one is None for one in solved):
+            failed += 1
+            continue
+        for k, row in enumerate(solved):
+            rows.append(row | {"pair": number, "step": step, "twin": k if len(solved) == 2 else -1})
+    return rows, failed
+
+
+def make_shard(number, sampling):
+    """Arrays of a shard by name. The pair's number is 1000 times that of the shard plus its place in it."""
+    random, rows, names, far, failed = np.random.default_rng([sampling.seed, number]), [], [], [], 0
+    known = scaled_inputs(sampling.reference)
+    while len(rows) < sampling.shard_patches:
+        candidate, distance = _keep_farthest(random, sampling, known)
+        some, missed = pair_patches(random, candidate, sampling, 1000 * number + len(names))
+        names, far, failed = [*names, candidate.pair.name], [*far, distance], failed + missed
+        rows += some
+        if sampling.candidates > 1 and some:
+            known = np.concatenate([known, scaled_inputs([row["descriptors"] for row in some])])
+    arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    small = "descriptors", "corrections", "exact", "base", "disk"
+    arrays |= {name: arrays[name].astype(np.float32) for name in small if name in arrays}
+    return arrays | {"names": np.array(names), "distances": np.array(far), "failed": np.array(failed)}
+
+
+def write_shards(folder, count, sampling, part=(1, 1), settings=None, report=print):
+    """Write the shards of ``count`` patches that are not there; ``part`` (k, n): every n-th one from the k-th on."""
+    shards.keep_settings(folder, settings or {"seed": sampling.seed, "shard_patches": sampling.shard_patches})
+    total = -(-count // sampling.shard_patches)
+    mine = [k for k in range(total) if k % part[1] == part[0] - 1]
+    missing = [k for k in mine if not shards.path_of(folder, k).exists()]
+    if len(missing) < len(mine):
+        report(f"{len(mine) - len(missing)} of {len(mine)} shards are there")
+    begin, spent = time.monotonic(), time.process_time()
+    for done, number in enumerate(missing, 1):
+        arrays = make_shard(number, sampling)
+        shards.write(shards.path_of(folder, number), arrays)
+        n, each = len(arrays["descriptors"]), (time.monotonic() - begin) / done
+        processor = 1e3 * (time.process_time() - spent) / done / n
+        report(
+            f"shard {number}: {n} patches, {int(arrays['failed'])} without a solution; {processor:.1f} ms of processor"
+            f" time a patch; {len(missing) - done} shards remain, about {each * (len(missing) - done) / 60:.0f} min"
+        )
+
+
+def _part(text):
+    """(k, n) of a text like 1/2."""
+    k, _, n = text.partition("/")
+    if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise argparse.ArgumentTypeError(f"expected two numbers such as 1/2, got {text}")
+    return int(k), int(n)
+
+
+def _options():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--count", type=int, required=True, help="patches, rounded up to whole shards")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--shard", type=int, default=SHARD_PATCHES, help="patches of a shard (%(default)s)")
+    parser.add_argument("--candidates", type=int, default=1, help="pairs that are drawn for each pair that is kept, the"
+                        " one farthest from the data (%(default)s: all are kept)")  # fmt: skip
+    parser.add_argument("--reference", type=Path, help="folder of finished shards from which distances count, too")
+    parser.add_argument("--profiles", type=Path, help="folder of measured profiles to start from")
+    parser.add_argument("--unsolved", action="store_true", help="descriptors alone, for training with a teacher")
+    parser.add_argument("--part", type=_part, default=(1, 1), help="k/n: every n-th shard from the k-th on")
+    asked = parser.parse_args()
+    for name, least in (("count", 1), ("seed", 0), ("shard", 1), ("candidates", 1)):
+        if getattr(asked, name) < least:
+            parser.error(f"--{name}: expected at least {least}, got {getattr(asked, name)}")
+    return parser, asked
+
+
+def main():
+    """Run the command."""
+    parser, asked = _options()
+    settings = {"wrcore": wrcore.__version__, "seed": asked.seed, "shard_patches": asked.shard,
+                "candidates": asked.candidates, "is_solved": not asked.unsolved, "points": POINTS,
+                "corrections": N_CORRECTIONS}  # fmt: skip
+    try:
+        measured, reference = None, np.zeros((0, 38))
+        if asked.profiles:
+            measured = read_measured(asked.profiles)
+            settings["profiles"] = shards.digest_of(p for p in sorted(asked.profiles.iterdir()) if p.is_file())
+        if asked.reference:
+            paths = shards.found_in(asked.reference)
+            reference = np.concatenate([shards.read(path)["descriptors"] for path in paths])
+            settings["reference"] = shards.digest_of(paths)
+        sampling = Sampling(asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference)
+        write_shards(asked.folder, asked.count, sampling, asked.part, settings,
+                     lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip
+    except InputError as error:
+        parser.error(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""Random positions of a wheel over its rail, and the choice of the patches to solve."""
+
+import math
+
+import numpy as np
+
+from study.surrogate.pairs import log_uniform
+from study.surrogate.solution import LOAD, OVERLAPS, ExactPatches
+
+LOADS = 500.0, 2.5e5
+"""Range of the normal force, N."""
+
+FRICTIONS = 0.03, 0.8
+"""Range of the coefficient of friction."""
+
+MOST_ANGLE = 1.35
+"""Largest contact angle, rad."""
+
+SPECIAL = 0.3
+"""Share of a pair's patches that have several overlaps or a double shape, where it has such patches. As some pairs
+have none, this makes about a fifth of all."""
+
+TWINS = 0.4
+"""Share of a pair's patches that are twins. Without twins linear critical speeds have an error of 1.4 m/s, with them
+0.5 m/s (mean of six pairs)."""
+
+POSITIONS = 400
+"""Positions that are drawn for each pair; ten times the patches that are kept, so that steep flanks are among them."""
+
+_ANGLES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.1])
+"""Edges of the classes of contact angle over which patches are drawn evenly, rad."""
+
+_DOUBLE = 1.8
+"""Value of <e^4> below which a shape is called double; a parabolic overlap has 2.33 and two equal peaks 1."""
+
+_KURTOSIS = 18
+"""Index of <e^4> in the descriptors."""
+
+_TWIN_STEPS = 2.5e-5, 2.5e-4
+"""Range of the distance of twins across the track, m."""
+
+_TWIN_LOADS = 0.3, 3.0
+"""Ratio of the loads of twins."""
+
+
+def random_friction(random):
+    """Coefficient of friction: 0.3 in every third pair, else over the whole range."""
+    return 0.3 if random.random() < 0.35 else log_uniform(random, *FRICTIONS)
+
+
+def axle_of(yaw, slope):
+    """Direction of an axle with these x and z components."""
+    return yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope
+
+
+def is_wanted(found):
+    """Whether a patch (`Found`) is in the range of the training; its load is that of the parabolic overlap."""
+    low, high = LOADS
+    return 0.7 * low < found.numbers[LOAD] < 1.3 * high and abs(found.shape.angle) < MOST_ANGLE
+
+
+def is_special(found):
+    """Whether a patch has several overlaps or a double shape."""
+    return found.numbers[OVERLAPS] > 1 or found.descriptors[_KURTOSIS] < _DOUBLE
+
+
+def draw_positions(random, exact: ExactPatches, count=POSITIONS):
+    """List of patches (`Found`) at random positions of the wheelset."""
+    half, drawn = exact.model.geometry.half_distance, []
+    aside = exact.model.geometry.rail_distance - half
+    for _ in range(count):
+        yaw = 0.0 if random.random() < 0.25 else float(np.clip(random.normal(0.0, 6e-3), -0.024, 0.024))
+        axle = axle_of(yaw, random.normal(0.0, 2.5e-3))
+        y = random.uniform(-9e-3, 14e-3) if random.random() < 0.6 else random.uniform(2e-3, 12e-3)
+        y += aside - 0.0105  # 0.0105 m: the usual value of ``aside``, for which the range of y was chosen
+        z = exact.touch(y, axle) - log_uniform(random, 4e-6, 2e-4) * random.choice([1.0, 1.0, 2.0])
+        drawn += [one for one in exact.find(y, z, axle) if is_wanted(one)]
+    return drawn
+
+
+def choose(random, drawn, count):
+    """``count`` of the patches, evenly over contact angle; a share `SPECIAL` of several overlaps or double shape."""
+    special = np.array([is_special(one) for one in drawn])
+    n = min(int(round(SPECIAL * count)), int(special.sum()))
+    chosen = _evenly(random, drawn, np.flatnonzero(special), n)
+    chosen += _evenly(random, drawn, np.flatnonzero(~special), count - n)
+    return [drawn[k] for k in chosen]
+
+
+def _evenly(random, drawn, among, count):
+    """Indices of at most ``count`` patches out of ``among``, evenly over classes of contact angle."""
+    count = min(count, len(among))
+    if count == 0:
+        return []
+    classes = np.digitize([abs(drawn[k].shape.angle) for k in among], _ANGLES)
+    weights = 1.0 / np.maximum(np.bincount(classes, minlength=len(_ANGLES) + 1)[classes], 5.0)
+    return list(random.choice(among, count, replace=False, p=weights / weights.sum()))
+
+
+def twin_of(random, exact, found):
+    """A patch at most 250 um aside of another one, with nearly the same load, and the distance (m); None if there is
+    none."""
+    y, z, ex, _, ez = found.position
+    step = log_uniform(random, *_TWIN_STEPS) * random.choice([-1.0, 1.0])
+    turn = 5e-5 * random.normal() if random.random() < 0.3 else 0.0
+    z += math.tan(found.shape.angle) * step - exact.model.geometry.half_distance * turn
+    z += 2e-6 * random.normal() if random.random() < 0.3 else 0.0
+    near = exact.find(y + step, z, axle_of(ex, ez + turn))
+    if not near:
+        return None
+    twin = min(near, key=lambda one: abs(one.shape.lateral - found.shape.lateral))
+    ratio = twin.numbers[LOAD] / found.numbers[LOAD]
+    return (twin, abs(step)) if is_wanted(twin) and _TWIN_LOADS[0] < ratio < _TWIN_LOADS[1] else None
+
+
+def choose_twins(random, exact, drawn, count):
+    """``count`` pairs (patch, twin, distance): on treads and roots, and a quarter about several overlaps."""
+    low = [one for one in drawn if abs(one.shape.angle) < 0.7]
+    births = [one for one in low if one.numbers[OVERLAPS] > 1]
+    found = []
+    for _ in range(4 * count):
+        among = births if births and random.random() < 0.25 else low
+        if len(found) >= count or not among:
+            break
+        one = among[random.integers(len(among))]
+        twin = twin_of(random, exact, one)
+        if twin is not None:
+            found.append((one, *twin))
+    return found

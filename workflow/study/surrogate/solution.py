@@ -1,0 +1,301 @@
+"""Contact patches at given positions: descriptors, exact solution, and what the network is to learn of it.
+
+The targets are defined by the product's own kernels, so that a network that meets them gives exact contact in
+`wrcore.dynamics.surrogate_wheel`:
+
+* Corrections (N_CORRECTIONS): ln N, ln a, ln b and ln p_max less those of the parabolic overlap; place along and
+  across the patch over l, contact angle and height over l less those of the parabolas of `PatchShape` at the exact
+  place across the patch and the exact semi-axis b.
+* Remainder: creep force of the exact solution less that of the creep table at the exact ellipse, load, place and angle,
+  at `POINTS` creepages of a wheel that rolls; over friction times N, and times c for the moment.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.contact.approach import LEVEL, pressed_together
+from wrcore.contact.creepage import creepages
+from wrcore.contact.detection import find_patches
+from wrcore.contact.patch.gap import group_end
+from wrcore.contact.patch.model import strip_work, with_tables
+from wrcore.contact.patch.windows import MORE
+from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS
+from wrcore.contact.strip import gap_at, make_pose
+from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, PatchShape, describe, parabola_at
+from wrcore.contact.surrogate.network import N_CORRECTIONS
+from wrcore.contact.surrogate.strips import fill_strips, new_strips
+from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.creep.kalker import coefficients_at
+from wrcore.creep.laws import LAWS
+from wrcore.dynamics import pair_table as columns
+from wrcore.dynamics.pair_node import (
+    AT_REST,
+    NUMBERS,
+    SLIPS,
+    SUMS,
+    along_normal,
+    press_lobe,
+    roll_lobe_on,
+    rolling_slip,
+    slide,
+)
+from wrcore.dynamics.pair_table import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
+from wrcore.dynamics.strip_wheel import copy_deepest
+from wrcore.dynamics.surrogate_wheel import _pressed
+from wrcore.dynamics.wheel import alone
+from wrcore.geometry.standards import named_profile
+from wrcore.kernels.handles import Handle
+from wrcore.kernels.jit import jit
+
+LIMITS = APART, FAR, SADDLE
+"""Limits of `lobe_end` at which overlaps are one patch, those of `surrogate_wheel`."""
+
+N_RANDOM = 12
+"""Rolling solutions at random creepages, beside five near rest."""
+
+POINTS = len(AT_REST) + N_RANDOM
+"""Rolling solutions of each patch, the ones near rest first."""
+
+MOST_FOUND = 4
+"""Patches of one position that are kept."""
+
+FLANGE, FIELD = -0.058, 0.050
+"""Range of the wheel profile in which first contact is searched, m."""
+
+_TOUCH_STEPS = 1200
+"""Steps of that search: 0.09 mm, the height of a crown is then right to 0.01 um."""
+
+PLACE, OVERLAPS, LOAD, LOG_A, LOG_B, P_MAX = range(6)
+"""Columns of `Found.numbers`: place on the wheel profile (m), number of overlaps, and the contact of a parabolic
+overlap with the same scales: load (N), ln of the semi-axes (over 1 m), largest pressure (Pa)."""
+
+
+class Found(NamedTuple):
+    """A patch at a position of the wheelset, before it is solved."""
+
+    position: np.ndarray
+    """(5,): y and z of the wheelset's centre (m) and the direction of its axle."""
+    numbers: np.ndarray
+    """(6,): `PLACE` and the columns after it."""
+    descriptors: np.ndarray
+    """(N_DESCRIPTORS,)."""
+    shape: PatchShape
+
+
+class Solved(NamedTuple):
+    """Exact contact of a patch and the targets of the network."""
+
+    load: float
+    """Normal force, N."""
+    angle: float
+    """Contact angle, rad."""
+    corrections: np.ndarray
+    """(N_CORRECTIONS,)."""
+    exact: np.ndarray
+    base: np.ndarray
+    """(POINTS, 3): exact creep force and moment and those of the creep table, over friction times N, and times c."""
+    disk: np.ndarray
+    """(POINTS, 2): place of the creepages in the disk of the force modes."""
+    velocities: np.ndarray
+    """(POINTS, 6): velocity of the wheelset over that along the track, linear and angular."""
+
+
+@jit(allocates=False)
+def _first_touch(geometry, y, ex, ey, ez):
+    """Height of the wheelset's centre at which the wheel first touches the rail, m."""
+    pose, least = make_pose(1.0, y, 0.0, ex, ey, ez, True), 1.0
+    for k in range(_TOUCH_STEPS + 1):
+        gap = gap_at(geometry, pose, FLANGE + (FIELD - FLANGE) * k / _TOUCH_STEPS)[0]
+        if gap < 0.9:  # beyond the profiles it is 1
+            least = min(least, gap)
+    return -least
+
+
+@jit(allocates=False)
+def _find(model, position, rows, row, sums, strips, corrections, zeros, numbers, descriptors, shapes):
+    """Fill ``numbers``, ``descriptors`` and ``shapes`` of the patches at a position; returns how many there are."""
+    geometry, n, first = model.geometry, 0, 0
+    y, z, ex, ey, ez = position[0], position[1], position[2], position[3], position[4]
+    pose = make_pose(1.0, y, z, ex, ey, ez, True)
+    count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
+    while first < count and n < len(numbers):
+        group = group_end(geometry, rows, count, first)
+        while first < group and n < len(numbers):
+            last = lobe_end(geometry, pose, rows, first, group, LIMITS)
+            place = log_depth_of(pressed_together(geometry, pose, True, LEVEL, rows, first, last, sums))[1]
+            copy_deepest(rows, first, last, row)
+            low, high = rows[first, OUTSIDE], rows[last - 1, BEYOND]
+            total, nodes = fill_strips(geometry, pose, row, low, high, strips)
+            shape = describe(strips, total, nodes, geometry.rolling_radius, ez, model.friction, descriptors[n])
+            if shape.square > 0.0:
+                p = _pressed(model, shape, 1.0, corrections, zeros)
+                numbers[n, PLACE], numbers[n, OVERLAPS], numbers[n, LOAD] = place, last - first, p.load
+                numbers[n, LOG_A], numbers[n, LOG_B], numbers[n, P_MAX] = p.log_a, p.log_b, p.p_max
+                for k in range(len(shape)):
+                    shapes[n, k] = shape[k]
+                n += 1
+            first = last
+    return n
+
+
+@jit(allocates=False)
+def _fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
+    """Fill creep forces of the creep table ``base`` (n, 3) and places in the disk (n, 2), as
+    :func:`wrcore.dynamics.surrogate_wheel.roll_patch` has them, for ``velocities`` (n, 6)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
+    unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
+    for k in range(len(velocities)):
+        v = velocities[k]
+        xi, eta, phi, _ = creepages(
+            v[0], v[1], v[2], v[3], v[4], v[5], slip[0], slip[1], slip[2], cosine, sine, 1.0
+        )  # fmt: skip
+        base[k, 0], base[k, 1], base[k, 2], _, _ = _at_ellipse(model, log_a, log_b, limit, xi, eta, phi)
+        p, q = xi * unit * c11, eta * unit * c22
+        root = 1.0 / (DISK + math.sqrt(DISK * DISK + p * p + q * q))
+        disk[k, 0], disk[k, 1] = p * root, q * root
+
+
+def random_points(random, count=N_RANDOM):
+    """Creepages (count, 2) over those of saturation, uniform over the disk of the force modes up to 0.965."""
+    r, angle = 0.965 * np.sqrt(random.random(count)), 2.0 * math.pi * random.random(count)
+    return 2.0 * DISK * np.stack([r * np.cos(angle), r * np.sin(angle)], 1) / (1.0 - r[:, None] ** 2)
+
+
+@lru_cache(maxsize=1)
+def _template():
+    """`ContactModel` of exact contact at the resolution ``middle`` with the creep table, of any pair."""
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    exact, table = (LoadedWheels(pair.geometry, name, "middle").contact for name in ("exact", "surrogate"))
+    return alone(exact, law=LAWS["table"], creep=table.creep, strips=with_tables(exact.strips), damping=1.0)
+
+
+@lru_cache(maxsize=1)
+def _works():
+    """Scratch arrays of two solutions, with fewer and with more strips."""
+    return [Handle(strip_work(_template().strips, 1, SLIPS)) for _ in range(2)]
+
+
+class ExactPatches:
+    """Finds the patches of a pair and solves them with exact contact at one coefficient of friction."""
+
+    def __init__(self, geometry, friction):
+        self.model = _template()._replace(geometry=geometry, friction=float(friction))
+        self._handle, self._strips = Handle(self.model), new_strips()
+        self._rows, self._row, self._sums = (
+            np.zeros((MAX_PATCHES, PATCH_COLUMNS)),
+            np.zeros(PATCH_COLUMNS),
+            np.zeros((3, 5)),
+        )
+        self._numbers, self._shapes = np.zeros((MOST_FOUND, 6)), np.zeros((MOST_FOUND, len(PatchShape._fields)))
+        self._descriptors = np.zeros((MOST_FOUND, N_DESCRIPTORS))
+
+    def touch(self, y, axle):
+        """Height of the wheelset's centre at first contact, m."""
+        return _first_touch(self.model.geometry, y, *axle)
+
+    def find(self, y, z, axle):
+        """List of the patches (`Found`) at a position."""
+        position, zeros = np.array([y, z, *axle]), np.zeros(N_CORRECTIONS)
+        n = _find(
+            self._handle, position, self._rows, self._row, self._sums, self._strips, zeros, zeros, self._numbers,
+            self._descriptors, self._shapes,
+        )  # fmt: skip
+        return [
+            Found(position, self._numbers[k].copy(), self._descriptors[k].copy(), PatchShape(*self._shapes[k]))
+            for k in range(n)
+        ]
+
+    def _press(self, found):
+        """Sums of `press_lobe`, and the solutions (weight, frame, work) of which it is the mean; None if there is
+        none."""
+        y, z, *axle = found.position
+        free = np.array([1.0, 0.0, 0.0, *(np.array(axle) / self.model.geometry.rolling_radius)])
+        sums, each, pressed = np.zeros(SUMS), np.zeros(SUMS), []
+        for work, more in zip(_works(), (1.0, MORE), strict=True):
+            windows, frame, share = press_lobe(
+                self._handle, y, z, tuple(axle), found.numbers[PLACE], LIMITS, free, more, each, work
+            )
+            if windows == 0:
+                return None
+            weight = 1.0 - pressed[0][0] if pressed else 1.0 - max(share, 0.0)
+            pressed.append((weight, frame, work))
+            sums += weight * each
+            if weight == 1.0:
+                break
+        return sums, pressed
+
+    def _wrenches(self, found, pressed, velocities):
+        """Wrenches of friction (n, 6) about the wheelset's centre for velocities (n, 6)."""
+        y, z, *axle = found.position
+        total = np.zeros((len(velocities), 6))
+        for weight, frame, work in pressed:
+            for first in range(0, len(velocities), SLIPS):
+                some, count = velocities[first : first + SLIPS], work.value.solved[0]
+                slips, forces = (np.zeros((len(some), rows, count)) for rows in (4, 3))
+                wrenches = np.zeros((len(some), 6))
+                roll_lobe_on(self._handle, y, z, tuple(axle), frame, some, slips, forces, wrenches, work)
+                total[first : first + SLIPS] += weight * wrenches
+        return total
+
+    def solve(self, found, points):
+        """`Solved` at rest and at creepages ``points`` (N_RANDOM, 2) over those of saturation; None where the strips
+        find no solution."""
+        pressed = self._press(found)
+        if pressed is None:
+            return None
+        sums, solutions = pressed
+        slip, (a, b), load = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])
+        cosine, sine, limit = sums[2] / load, -sums[1] / load, self.model.friction * load
+        angle, log_a, log_b, c = math.atan2(sine, cosine), math.log(a), math.log(b), math.sqrt(a * b)
+        velocities = self._velocities(found, slip, angle, log_a, log_b, limit, np.vstack([AT_REST, points]))
+        exact, base, disk = np.zeros((POINTS, 3)), np.zeros((POINTS, 3)), np.zeros((POINTS, 2))
+        wrenches = self._wrenches(found, solutions, velocities)
+        along_normal(wrenches, tuple(slip), cosine, sine, c, limit, exact)
+        _fill_base(self._handle, velocities, tuple(slip), log_a, log_b, angle, limit, base, disk)
+        numbers = math.log(load), log_a, log_b, math.log(sums[11])
+        corrections = self._corrections(found, slip, angle, b, numbers)
+        solved = Solved(load, angle, corrections, exact, base, disk, velocities)
+        return solved if all(np.isfinite(part).all() for part in solved) else None
+
+    def _velocities(self, found, slip, angle, log_a, log_b, limit, points):
+        """Velocities (n, 6) of a wheel that rolls with these creepages over those of saturation at the ``slip``."""
+        geometry, axle, numbers = self.model.geometry, found.position[2:], np.zeros(NUMBERS)
+        numbers[columns.ANGLE] = angle
+        numbers[columns.PLACE_X : columns.PLACE_Z + 1] = (
+            slip - geometry.half_distance * axle + [0.0, 0.0, geometry.rolling_radius]
+        )
+        free = rolling_slip(numbers, axle[2], axle[0], geometry.half_distance, geometry.rolling_radius, 0.0, 0.0)
+        kalker = np.array(coefficients_at(log_a - log_b, self.model.creep.table.kalker)[:2])
+        unit = self.model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
+        velocities = np.empty((len(points), 6))
+        slide(free, tuple(slip), math.cos(angle), points / (kalker * unit), velocities)
+        return velocities
+
+    def _corrections(self, found, slip, angle, b, numbers):
+        """Corrections (N_CORRECTIONS,) with which `surrogate_wheel` gives this place, angle and these ``numbers``: ln of
+        N, a, b and p_max."""
+        shape, base, y = found.shape, found.numbers, found.position[0]
+        lateral = slip[1] + y - self.model.geometry.rail_distance - shape.lateral
+        e = lateral / (shape.sigma * math.cos(shape.angle))
+        spread = 0.2 * (b / shape.sigma) ** 2
+        of_angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)
+        ahead = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread)
+        height = parabola_at(shape.height, shape.height_1, shape.height_2, shape.third, e, spread)
+        load, log_a, log_b, log_peak = numbers
+        return np.array(
+            [
+                load - math.log(base[LOAD]),
+                log_a - base[LOG_A],
+                log_b - base[LOG_B],
+                log_peak - math.log(base[P_MAX]),
+                (slip[0] - ahead) / shape.length,
+                e * shape.sigma / shape.length,
+                angle - of_angle,
+                (slip[2] - height) / shape.length,
+            ]
+        )
