@@ -1,0 +1,184 @@
+"""Training data of the surrogate's network, from shards of patches: scaled inputs, targets, twins."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from study.surrogate import shards
+from wrcore.contact.surrogate.network import N_CORRECTIONS, force_modes
+from wrcore.errors import InputError
+
+HELD_BACK = 20
+"""One pair of so many is held back to judge the network."""
+
+CORRECTION_ERRORS = np.array([1e-3, 2e-3, 2e-3, 8e-3, 5e-4, 1e-3, 3e-4, 2e-4])
+"""Errors of the corrections that count as one: of ln N, ln a, ln b, ln p_max, of the place along and across over l, of
+the angle (rad) and of the height over l. A loss with place and angle at eight times these gave errors of 1 to 3 m/s in
+linear critical speeds."""
+
+FORCE_ERRORS = np.array([0.005, 0.005, 0.01])
+"""Errors of the creep force (over friction times N) and of the moment (times c) that count as one."""
+
+OUTPUT_SCALE = 5.0
+"""The network's outputs are the corrections over so many of the errors that count as one."""
+
+BIRTH_WEIGHT = 0.1
+"""Weight of twins about several overlaps; at 1 they rule the loss, and the force on treads becomes 20 % worse."""
+
+FALLBACK_SCALE = 0.15
+"""Share of the standard deviation below which the scale of a descriptor does not fall: some are 0 in most patches."""
+
+
+class Scaling(NamedTuple):
+    """Shift, scale and range of the descriptors, (N_DESCRIPTORS,) each."""
+
+    median: np.ndarray
+    scale: np.ndarray
+    least: np.ndarray
+    greatest: np.ndarray
+    """Range of 99.8 % of the training data."""
+
+    def compressed(self, descriptors):
+        """Inputs of the network, float32."""
+        x = (descriptors - self.median) / self.scale
+        return (x / (1.0 + x * x) ** 0.25).astype(np.float32)
+
+
+class Patches(NamedTuple):
+    """Arrays over patches, in the units of the loss."""
+
+    inputs: np.ndarray
+    corrections: np.ndarray
+    """(n, N_CORRECTIONS) over `CORRECTION_ERRORS`."""
+    forces: np.ndarray
+    """(n, POINTS, 3): remainder over `FORCE_ERRORS`."""
+    disk: np.ndarray
+    """(n, POINTS, 2)."""
+
+
+class Twins(NamedTuple):
+    """Pairs of neighbouring patches: their indices, distance (m) and weight."""
+
+    first: np.ndarray
+    second: np.ndarray
+    step: np.ndarray
+    weight: np.ndarray
+
+
+class TrainingData(NamedTuple):
+    """What is trained on, and what is held back."""
+
+    scaling: Scaling
+    training: Patches
+    twins: Twins
+    held_back: Patches
+    digest: str
+    """SHA-256 of the shards."""
+
+
+def scaling_of(descriptors):
+    """`Scaling` of training descriptors (n, N_DESCRIPTORS)."""
+    low, median, high = np.percentile(descriptors, [5, 50, 95], axis=0)
+    scale = np.maximum((high - low) / 3.3, FALLBACK_SCALE * np.std(descriptors, axis=0))
+    least, greatest = np.percentile(descriptors, [0.1, 99.9], axis=0)
+    scale, width = np.maximum(scale, 1e-6), np.maximum(greatest - least, 1e-9)
+    return Scaling(median, scale, least, least + width)
+
+
+def teacher_scaling(teacher):
+    """`Scaling` of the weights of a trained network."""
+    return Scaling(*(teacher[name] for name in Scaling._fields))
+
+
+def run_teacher(teacher, descriptors):
+    """Corrections (n, N_CORRECTIONS) and coefficients of the force modes (n, modes) of trained weights."""
+    x = teacher_scaling(teacher).compressed(descriptors).astype(float)
+    for k in (1, 2, 3, 4):
+        x = x @ teacher[f"weights_{k}"].astype(float) + teacher[f"biases_{k}"]
+        x = 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0)) if k < 4 else x
+    return x[:, :N_CORRECTIONS] * teacher["corrections"], x[:, N_CORRECTIONS:]
+
+
+def taught(teacher, descriptors, disk):
+    """Corrections and remainders (n, POINTS, 3) by trained weights."""
+    corrections, coefficients = run_teacher(teacher, descriptors)
+    remainders = np.empty((*disk.shape[:2], 3), np.float32)
+    for first in range(0, len(disk), 2000):
+        some = disk[first : first + 2000].astype(float)
+        modes = force_modes(teacher, *some.reshape(-1, 2).T).reshape(*some.shape[:2], 3, -1)
+        remainders[first : first + 2000] = np.einsum("nk,npck->npc", coefficients[first : first + 2000], modes)
+    return corrections, remainders
+
+
+def _joined(folders):
+    """Arrays of all shards by name, with numbers of pairs that differ between folders, and the digest."""
+    paths, parts = [], []
+    for place, folder in enumerate(folders):
+        for path in shards.found_in(folder):
+            part = shards.read(path)
+            part["pair"] = part["pair"].astype(np.int64) + place * 10**9
+            paths.append(path)
+            parts.append({name: array for name, array in part.items() if len(np.shape(array)) and name not in _OF_SHARD})
+    names = set.intersection(*(set(part) for part in parts))
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}, shards.digest_of(paths)
+
+
+_OF_SHARD = "names", "distances"
+
+
+def _random_disk(n):
+    """Places (n, POINTS, 2) of creepages for patches that are not solved."""
+    from study.surrogate.solution import AT_REST, N_RANDOM, random_points
+    from wrcore.dynamics.pair_table import DISK
+
+    random = np.random.default_rng(n)
+    points = np.concatenate([np.tile(AT_REST, (n, 1, 1)), random_points(random, n * N_RANDOM).reshape(n, -1, 2)], axis=1)
+    return points / (DISK + np.sqrt(DISK**2 + (points**2).sum(-1, keepdims=True)))
+
+
+def load(folders, teacher=None):
+    """`TrainingData` of folders with shards.
+
+    With a ``teacher`` (arrays of weights by name) the targets are its outputs, and the shards may be unsolved."""
+    rows, digest = _joined(folders)
+    descriptors, disk = rows["descriptors"].astype(float), rows.get("disk")
+    if teacher is not None:
+        disk = _random_disk(len(descriptors)) if disk is None else disk
+        corrections, remainder = taught(teacher, descriptors, disk)
+    elif "corrections" in rows:
+        corrections, remainder = rows["corrections"], rows["exact"] - rows["base"]
+    else:
+        raise InputError(str(folders[0]), "shards", "expected solved patches, or --teacher with weights to learn from")
+    whole = Patches(descriptors, corrections / CORRECTION_ERRORS, remainder / FORCE_ERRORS, disk)
+    is_usable = np.all([np.isfinite(a).reshape(len(a), -1).all(1) for a in whole], axis=0)
+    held = is_held_back(rows["pair"])
+    if held.all() or not held.any():
+        raise InputError(str(folders[0]), "shards", "expected patches of at least two pairs")
+    training, held_back = np.flatnonzero(is_usable & ~held), np.flatnonzero(is_usable & held)
+    scaling = teacher_scaling(teacher) if teacher is not None else scaling_of(descriptors[training])
+    parts = (_part(whole, scaling, some) for some in (training, held_back))
+    return TrainingData(scaling, next(parts), _twins(rows, training), next(parts), digest)
+
+
+def is_held_back(pairs):
+    """Whether patches are of pairs that are held back: the same ones whatever else there is."""
+    known = np.unique(pairs)
+    held = [pair for pair in known if np.random.default_rng(int(pair)).random() < 1.0 / HELD_BACK]
+    return np.isin(pairs, held or known[-1:])
+
+
+def _part(whole, scaling, some):
+    inputs = scaling.compressed(whole.inputs[some])
+    return Patches(inputs, *(array[some].astype(np.float32) for array in whole[1:]))
+
+
+def _twins(rows, training):
+    """`Twins` among the patches ``training``."""
+    place = np.full(len(rows["pair"]), -1)
+    place[training] = np.arange(len(training))
+    first = np.flatnonzero((rows["twin"][:-1] == 0) & (rows["twin"][1:] == 1))
+    first = first[(place[first] >= 0) & (place[first + 1] >= 0)]
+    overlaps = np.maximum(rows["overlaps"][first], rows["overlaps"][first + 1])
+    weight = np.where(overlaps > 1, BIRTH_WEIGHT, 1.0)
+    step = rows["step"][first]
+    return Twins(place[first], place[first + 1], step.astype(np.float32), weight.astype(np.float32))
