@@ -185,8 +185,9 @@ def rail_base(random, measured):
         name = f"circle:{random.uniform(0.1, 0.5):.3f}"
         return named_profile(name, "rail"), name, None
     name = RAILS[random.integers(len(RAILS))]
-    usual = random.random() < 0.5
-    inclination = float(random.choice([0.0, 1 / 40, 1 / 30, 1 / 20]) if usual else random.uniform(0.0, MOST_INCLINATION))
+    inclination = float(random.choice([0.0, 1 / 40, 1 / 30, 1 / 20]))
+    if random.random() < 0.5:
+        inclination = random.uniform(0.0, MOST_INCLINATION)
     return named_profile(name, "rail", inclination), f"{name} at {inclination:.4f}", inclination
 
 

@@ -58,7 +58,7 @@ def keep_settings(folder, settings):
         known = json.loads(path.read_text("utf-8"))
         for name, value in settings.items():
             if known.get(name) != value:
-                expected = f"expected {known.get(name)} as in the shards that are there, got {value}; choose a new folder"
+                expected = f"expected {known.get(name)} as in the existing shards, got {value}; choose a new folder"
                 raise InputError(str(path), name, expected)
         return
     temporary = path.with_suffix(f".{os.getpid()}.tmp")

@@ -99,7 +99,9 @@ def draw_batches(data, settings, call):
     points = random.permutation(np.arange(N_REST, data.training.disk.shape[1]))[:OTHER_POINTS]
     points = np.concatenate([np.arange(N_REST), points])
     of = data.training
-    step, weight = (data.twins.step[chosen], data.twins.weight[chosen]) if n else (np.zeros((CHUNK, 0), np.float32),) * 2
+    step, weight = np.zeros((2, CHUNK, 0), np.float32)
+    if n:
+        step, weight = data.twins.step[chosen], data.twins.weight[chosen]
     return Batch(of.inputs[some], of.corrections[some], of.forces[some][:, :, points], of.disk[some][:, :, points],
                  step, weight)  # fmt: skip
 
@@ -217,6 +219,10 @@ def train(data, settings, out, teacher="", report=print):
     return state
 
 
+def _say(line):
+    print(line, file=sys.stderr, flush=True)
+
+
 def _options():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
@@ -247,10 +253,10 @@ def main():
     try:
         teacher = shards.read(asked.teacher) if asked.teacher else None
         data = load(asked.folders, teacher)
-        line = f"{len(data.training.inputs)} patches, {len(data.twins.step)} twins, {len(data.held_back.inputs)} held back"
-        print(line, file=sys.stderr, flush=True)
-        train(data, settings, asked.out, shards.digest_of([asked.teacher]) if asked.teacher else "",
-              lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip
+        teacher_digest = shards.digest_of([asked.teacher]) if asked.teacher else ""
+        n, held, twins = len(data.training.inputs), len(data.held_back.inputs), len(data.twins.step)
+        _say(f"{n} patches, among them {twins} pairs of twins; {held} held back")
+        train(data, settings, asked.out, teacher_digest, _say)
     except InputError as error:
         parser.error(str(error))
 

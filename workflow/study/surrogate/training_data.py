@@ -118,12 +118,13 @@ def _joined(folders):
             part = shards.read(path)
             part["pair"] = part["pair"].astype(np.int64) + place * 10**9
             paths.append(path)
-            parts.append({name: array for name, array in part.items() if len(np.shape(array)) and name not in _OF_SHARD})
+            parts.append({name: array for name, array in part.items() if name not in _OF_SHARD})
     names = set.intersection(*(set(part) for part in parts))
     return {name: np.concatenate([part[name] for part in parts]) for name in names}, shards.digest_of(paths)
 
 
-_OF_SHARD = "names", "distances"
+_OF_SHARD = "names", "distances", "failed"
+"""Arrays of a shard that are not over patches."""
 
 
 def _random_disk(n):
@@ -132,7 +133,8 @@ def _random_disk(n):
     from wrcore.dynamics.pair_table import DISK
 
     random = np.random.default_rng(n)
-    points = np.concatenate([np.tile(AT_REST, (n, 1, 1)), random_points(random, n * N_RANDOM).reshape(n, -1, 2)], axis=1)
+    points = random_points(random, n * N_RANDOM).reshape(n, N_RANDOM, 2)
+    points = np.concatenate([np.tile(AT_REST, (n, 1, 1)), points], axis=1)
     return points / (DISK + np.sqrt(DISK**2 + (points**2).sum(-1, keepdims=True)))
 
 
