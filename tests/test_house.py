@@ -15,6 +15,9 @@ ROOMS = (
 
 STUDY = ("study", "workflow", "snakemake", "tests")
 
+COMMANDS = {"surrogate"}
+"""Packages of the study whose commands a person runs, and that the workflow does not."""
+
 
 def imports(tree):
     """Modules that a file imports, with lines; what only a type checker reads is left out."""
@@ -103,7 +106,7 @@ def test_the_core_shows_its_rooms_and_nothing_else():
 
 def test_every_question_has_its_drawers():
     """Study package, rules, scripts and captions share the names; sections of the configuration too."""
-    questions = {p.name for p in (ROOT / "workflow/study").iterdir() if p.is_dir()} - {"__pycache__"}
+    questions = {p.name for p in (ROOT / "workflow/study").iterdir() if p.is_dir()} - {"__pycache__"} - COMMANDS
     assert {p.stem for p in (ROOT / "workflow/rules").glob("*.smk")} == questions | {"common"}
     assert {p.name for p in (ROOT / "workflow/scripts").iterdir()} == questions
     assert {p.name for p in (ROOT / "workflow/report").iterdir() if p.is_dir()} == questions - {"report"}

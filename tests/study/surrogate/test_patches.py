@@ -1,4 +1,4 @@
-"""Shards of solved patches: the same again from the seed, continued after a kill, and targets that mean exact contact."""
+"""Shards of solved patches: the same again from a seed, continued after a kill; targets that mean exact contact."""
 
 import math
 
@@ -143,10 +143,8 @@ def constant_surrogate(corrections, remainder):
     """`Surrogate` whose outputs are the same for every overlap, with one force mode for each of Fx, Fy and Mz."""
     biases = np.concatenate([corrections, remainder])
     sizes = 38, 8, 8, 8, len(biases)
-    double, single = (
-        Layers(*(part for a, b in zip(sizes[:-1], sizes[1:], strict=True) for part in (np.zeros((a, b), kind), np.zeros(b, kind))))
-        for kind in (float, np.float32)
-    )  # fmt: skip
+    shapes = [shape for a, b in zip(sizes[:-1], sizes[1:], strict=True) for shape in ((a, b), (b,))]
+    double, single = (Layers(*(np.zeros(shape, kind) for shape in shapes)) for kind in (float, np.float32))
     modes = np.zeros((FORCE_CELLS + 2, FORCE_CELLS + 2, 3, 3), np.float32)
     modes[:, :, range(3), range(3)] = 1.0
     ones = np.ones(38)

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 import wrcore
 from study.surrogate import shards
+from study.surrogate.finding import OVERLAPS
 from study.surrogate.pairs import random_pair, read_measured
 from study.surrogate.positions import (
     LOADS,
@@ -28,7 +29,7 @@ from study.surrogate.positions import (
     draw_positions,
     random_friction,
 )
-from study.surrogate.solution import OVERLAPS, POINTS, ExactPatches, random_points
+from study.surrogate.solution import POINTS, ExactPatches, random_points
 from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
 from wrcore.errors import InputError
 

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from study.surrogate.finding import LOAD, OVERLAPS
 from study.surrogate.pairs import log_uniform
-from study.surrogate.solution import LOAD, OVERLAPS, ExactPatches
+from study.surrogate.solution import ExactPatches
 
 LOADS = 500.0, 2.5e5
 """Range of the normal force, N."""

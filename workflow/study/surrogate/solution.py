@@ -16,18 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from study.surrogate.finding import LIMITS, LOAD, LOG_A, LOG_B, P_MAX, PLACE, fill_base, find_described, first_touch
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.contact.approach import LEVEL, pressed_together
-from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import find_patches
-from wrcore.contact.patch.gap import group_end
 from wrcore.contact.patch.model import strip_work, with_tables
 from wrcore.contact.patch.windows import MORE
-from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS
-from wrcore.contact.strip import gap_at, make_pose
-from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, PatchShape, describe, parabola_at
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, PatchShape, parabola_at
 from wrcore.contact.surrogate.network import N_CORRECTIONS
-from wrcore.contact.surrogate.strips import fill_strips, new_strips
+from wrcore.contact.surrogate.strips import new_strips
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS
@@ -43,16 +39,10 @@ from wrcore.dynamics.pair_node import (
     rolling_slip,
     slide,
 )
-from wrcore.dynamics.pair_table import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
-from wrcore.dynamics.strip_wheel import copy_deepest
-from wrcore.dynamics.surrogate_wheel import _pressed
+from wrcore.dynamics.pair_table import DISK
 from wrcore.dynamics.wheel import alone
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.handles import Handle
-from wrcore.kernels.jit import jit
-
-LIMITS = APART, FAR, SADDLE
-"""Limits of `lobe_end` at which overlaps are one patch, those of `surrogate_wheel`."""
 
 N_RANDOM = 12
 """Rolling solutions at random creepages, beside five near rest."""
@@ -62,16 +52,6 @@ POINTS = len(AT_REST) + N_RANDOM
 
 MOST_FOUND = 4
 """Patches of one position that are kept."""
-
-FLANGE, FIELD = -0.058, 0.050
-"""Range of the wheel profile in which first contact is searched, m."""
-
-_TOUCH_STEPS = 1200
-"""Steps of that search: 0.09 mm, the height of a crown is then right to 0.01 um."""
-
-PLACE, OVERLAPS, LOAD, LOG_A, LOG_B, P_MAX = range(6)
-"""Columns of `Found.numbers`: place on the wheel profile (m), number of overlaps, and the contact of a parabolic
-overlap with the same scales: load (N), ln of the semi-axes (over 1 m), largest pressure (Pa)."""
 
 
 class Found(NamedTuple):
@@ -102,62 +82,6 @@ class Solved(NamedTuple):
     """(POINTS, 2): place of the creepages in the disk of the force modes."""
     velocities: np.ndarray
     """(POINTS, 6): velocity of the wheelset over that along the track, linear and angular."""
-
-
-@jit(allocates=False)
-def _first_touch(geometry, y, ex, ey, ez):
-    """Height of the wheelset's centre at which the wheel first touches the rail, m."""
-    pose, least = make_pose(1.0, y, 0.0, ex, ey, ez, True), 1.0
-    for k in range(_TOUCH_STEPS + 1):
-        gap = gap_at(geometry, pose, FLANGE + (FIELD - FLANGE) * k / _TOUCH_STEPS)[0]
-        if gap < 0.9:  # beyond the profiles it is 1
-            least = min(least, gap)
-    return -least
-
-
-@jit(allocates=False)
-def _find(model, position, rows, row, sums, strips, corrections, zeros, numbers, descriptors, shapes):
-    """Fill ``numbers``, ``descriptors`` and ``shapes`` of the patches at a position; returns how many there are."""
-    geometry, n, first = model.geometry, 0, 0
-    y, z, ex, ey, ez = position[0], position[1], position[2], position[3], position[4]
-    pose = make_pose(1.0, y, z, ex, ey, ez, True)
-    count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
-    while first < count and n < len(numbers):
-        group = group_end(geometry, rows, count, first)
-        while first < group and n < len(numbers):
-            last = lobe_end(geometry, pose, rows, first, group, LIMITS)
-            place = log_depth_of(pressed_together(geometry, pose, True, LEVEL, rows, first, last, sums))[1]
-            copy_deepest(rows, first, last, row)
-            low, high = rows[first, OUTSIDE], rows[last - 1, BEYOND]
-            total, nodes = fill_strips(geometry, pose, row, low, high, strips)
-            shape = describe(strips, total, nodes, geometry.rolling_radius, ez, model.friction, descriptors[n])
-            if shape.square > 0.0:
-                p = _pressed(model, shape, 1.0, corrections, zeros)
-                numbers[n, PLACE], numbers[n, OVERLAPS], numbers[n, LOAD] = place, last - first, p.load
-                numbers[n, LOG_A], numbers[n, LOG_B], numbers[n, P_MAX] = p.log_a, p.log_b, p.p_max
-                for k in range(len(shape)):
-                    shapes[n, k] = shape[k]
-                n += 1
-            first = last
-    return n
-
-
-@jit(allocates=False)
-def _fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
-    """Fill creep forces of the creep table ``base`` (n, 3) and places in the disk (n, 2), as
-    :func:`wrcore.dynamics.surrogate_wheel.roll_patch` has them, for ``velocities`` (n, 6)."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
-    unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
-    for k in range(len(velocities)):
-        v = velocities[k]
-        xi, eta, phi, _ = creepages(
-            v[0], v[1], v[2], v[3], v[4], v[5], slip[0], slip[1], slip[2], cosine, sine, 1.0
-        )  # fmt: skip
-        base[k, 0], base[k, 1], base[k, 2], _, _ = _at_ellipse(model, log_a, log_b, limit, xi, eta, phi)
-        p, q = xi * unit * c11, eta * unit * c22
-        root = 1.0 / (DISK + math.sqrt(DISK * DISK + p * p + q * q))
-        disk[k, 0], disk[k, 1] = p * root, q * root
 
 
 def random_points(random, count=N_RANDOM):
@@ -196,12 +120,12 @@ class ExactPatches:
 
     def touch(self, y, axle):
         """Height of the wheelset's centre at first contact, m."""
-        return _first_touch(self.model.geometry, y, *axle)
+        return first_touch(self.model.geometry, y, *axle)
 
     def find(self, y, z, axle):
         """List of the patches (`Found`) at a position."""
         position, zeros = np.array([y, z, *axle]), np.zeros(N_CORRECTIONS)
-        n = _find(
+        n = find_described(
             self._handle, position, self._rows, self._row, self._sums, self._strips, zeros, zeros, self._numbers,
             self._descriptors, self._shapes,
         )  # fmt: skip
@@ -256,7 +180,7 @@ class ExactPatches:
         exact, base, disk = np.zeros((POINTS, 3)), np.zeros((POINTS, 3)), np.zeros((POINTS, 2))
         wrenches = self._wrenches(found, solutions, velocities)
         along_normal(wrenches, tuple(slip), cosine, sine, c, limit, exact)
-        _fill_base(self._handle, velocities, tuple(slip), log_a, log_b, angle, limit, base, disk)
+        fill_base(self._handle, velocities, tuple(slip), log_a, log_b, angle, limit, base, disk)
         numbers = math.log(load), log_a, log_b, math.log(sums[11])
         corrections = self._corrections(found, slip, angle, b, numbers)
         solved = Solved(load, angle, corrections, exact, base, disk, velocities)
@@ -277,8 +201,8 @@ class ExactPatches:
         return velocities
 
     def _corrections(self, found, slip, angle, b, numbers):
-        """Corrections (N_CORRECTIONS,) with which `surrogate_wheel` finds this place and angle and these ``numbers``: ln
-        of N, a, b and p_max."""
+        """Corrections (N_CORRECTIONS,) with which `surrogate_wheel` finds this place and angle and these ``numbers``:
+        ln of N, a, b and p_max."""
         shape, base, y = found.shape, found.numbers, found.position[0]
         lateral = slip[1] + y - self.model.geometry.rail_distance - shape.lateral
         e = lateral / (shape.sigma * math.cos(shape.angle))

@@ -1,0 +1,86 @@
+"""Kernels that find and describe the contact patches of a wheel for the training of the surrogate."""
+
+import math
+
+from wrcore.contact.approach import LEVEL, pressed_together
+from wrcore.contact.creepage import creepages
+from wrcore.contact.detection import find_patches
+from wrcore.contact.patch.gap import group_end
+from wrcore.contact.reduction import BEYOND, MOMENT, OUTSIDE
+from wrcore.contact.strip import gap_at, make_pose
+from wrcore.contact.surrogate.descriptors import describe
+from wrcore.contact.surrogate.strips import fill_strips
+from wrcore.creep.kalker import coefficients_at
+from wrcore.dynamics.pair_table import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
+from wrcore.dynamics.strip_wheel import copy_deepest
+from wrcore.dynamics.surrogate_wheel import _pressed
+from wrcore.kernels.jit import jit
+
+LIMITS = APART, FAR, SADDLE
+"""Limits of `lobe_end` at which overlaps are one patch, those of `surrogate_wheel`."""
+
+FLANGE, FIELD = -0.058, 0.050
+"""Range of the wheel profile in which first contact is searched, m."""
+
+_TOUCH_STEPS = 1200
+"""Steps of that search: 0.09 mm, the height of a crown is then right to 0.01 um."""
+
+PLACE, OVERLAPS, LOAD, LOG_A, LOG_B, P_MAX = range(6)
+"""Columns of `Found.numbers`: place on the wheel profile (m), number of overlaps, and the contact of a parabolic
+overlap with the same scales: load (N), ln of the semi-axes (over 1 m), largest pressure (Pa)."""
+
+
+@jit(allocates=False)
+def first_touch(geometry, y, ex, ey, ez):
+    """Height of the wheelset's centre at which the wheel first touches the rail, m."""
+    pose, least = make_pose(1.0, y, 0.0, ex, ey, ez, True), 1.0
+    for k in range(_TOUCH_STEPS + 1):
+        gap = gap_at(geometry, pose, FLANGE + (FIELD - FLANGE) * k / _TOUCH_STEPS)[0]
+        if gap < 0.9:  # beyond the profiles it is 1
+            least = min(least, gap)
+    return -least
+
+
+@jit(allocates=False)
+def find_described(model, position, rows, row, sums, strips, corrections, zeros, numbers, descriptors, shapes):
+    """Fill ``numbers``, ``descriptors`` and ``shapes`` of the patches at a position; returns how many there are."""
+    geometry, n, first = model.geometry, 0, 0
+    y, z, ex, ey, ez = position[0], position[1], position[2], position[3], position[4]
+    pose = make_pose(1.0, y, z, ex, ey, ez, True)
+    count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
+    while first < count and n < len(numbers):
+        group = group_end(geometry, rows, count, first)
+        while first < group and n < len(numbers):
+            last = lobe_end(geometry, pose, rows, first, group, LIMITS)
+            place = log_depth_of(pressed_together(geometry, pose, True, LEVEL, rows, first, last, sums))[1]
+            copy_deepest(rows, first, last, row)
+            low, high = rows[first, OUTSIDE], rows[last - 1, BEYOND]
+            total, nodes = fill_strips(geometry, pose, row, low, high, strips)
+            shape = describe(strips, total, nodes, geometry.rolling_radius, ez, model.friction, descriptors[n])
+            if shape.square > 0.0:
+                p = _pressed(model, shape, 1.0, corrections, zeros)
+                numbers[n, PLACE], numbers[n, OVERLAPS], numbers[n, LOAD] = place, last - first, p.load
+                numbers[n, LOG_A], numbers[n, LOG_B], numbers[n, P_MAX] = p.log_a, p.log_b, p.p_max
+                for k in range(len(shape)):
+                    shapes[n, k] = shape[k]
+                n += 1
+            first = last
+    return n
+
+
+@jit(allocates=False)
+def fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
+    """Fill creep forces of the creep table ``base`` (n, 3) and places in the disk (n, 2), as
+    :func:`wrcore.dynamics.surrogate_wheel.roll_patch` has them, for ``velocities`` (n, 6)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
+    unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
+    for k in range(len(velocities)):
+        v = velocities[k]
+        xi, eta, phi, _ = creepages(
+            v[0], v[1], v[2], v[3], v[4], v[5], slip[0], slip[1], slip[2], cosine, sine, 1.0
+        )  # fmt: skip
+        base[k, 0], base[k, 1], base[k, 2], _, _ = _at_ellipse(model, log_a, log_b, limit, xi, eta, phi)
+        p, q = xi * unit * c11, eta * unit * c22
+        root = 1.0 / (DISK + math.sqrt(DISK * DISK + p * p + q * q))
+        disk[k, 0], disk[k, 1] = p * root, q * root
