@@ -53,7 +53,7 @@ def test_shard_holds_what_the_training_reads(shard):
     assert shard["corrections"].shape == (n, N_CORRECTIONS)
     assert shard["exact"].shape == shard["base"].shape == (n, POINTS, 3)
     assert (np.hypot(*shard["disk"].transpose(2, 0, 1)) < 1.0).all()
-    assert (np.hypot(shard["exact"][..., 0], shard["exact"][..., 1]) < 1.0 + 1e-6).all()
+    assert (np.hypot(shard["exact"][..., 0], shard["exact"][..., 1]) < 1.0 + 1e-4).all()
     assert np.abs(shard["exact"] - shard["base"]).max() < 0.5
 
 
@@ -169,7 +169,7 @@ def row_of(geometry, position, velocity, friction, surrogate, monkeypatch):
 def test_exact_targets_as_outputs_give_exact_contact(y, monkeypatch):
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40), rolling_radius=0.4)
     mu, axle = 0.25, (2e-3, math.sqrt(1.0 - 5e-6), 1e-3)
-    exact = ExactPatches(pair.geometry, mu)
+    exact = ExactPatches(pair, mu)
     (found, *others) = exact.find(y, exact.touch(y, axle) - 7e-5, axle)
     assert others == []
     solved = exact.solve(found, random_points(np.random.default_rng(1)))

@@ -198,8 +198,7 @@ def worn_rail(random, rail, name, wheel, shift):
     that was turned, on the other side."""
     if random.random() < 0.25:
         return rail, name
-    low, high = max(rail.u[0], -0.05), min(rail.u[-1], 0.05)
-    u, new = _points(rail, low, high)
+    u, new = _points(rail, -0.1, 0.1)
     f, side = new.copy(), (1.0 if random.random() < 0.85 else -1.0)
     worn = smooth_step((u - u[0] - 1e-3) / 6e-3) * (1.0 - smooth_step((u - u[-1] + 7e-3) / 6e-3))
     if random.random() < 0.4:

@@ -33,7 +33,7 @@ from study.surrogate.solution import POINTS, ExactPatches, random_points
 from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
 from wrcore.errors import InputError
 
-PAIR_PATCHES = 40
+PAIR_PATCHES = 60
 """Patches of each pair of profiles."""
 
 SHARD_PATCHES = 400
@@ -82,7 +82,7 @@ def _draw_candidate(random, sampling):
     """A `_Candidate` that has enough patches."""
     while True:
         pair = random_pair(random, sampling.measured)
-        exact = ExactPatches(pair.on_rail.geometry, random_friction(random))
+        exact = ExactPatches(pair.on_rail, random_friction(random))
         drawn = draw_positions(random, exact)
         if len(drawn) >= LEAST_DRAWN:
             return _Candidate(pair, exact, drawn)

@@ -50,8 +50,15 @@ N_RANDOM = 12
 POINTS = len(AT_REST) + N_RANDOM
 """Rolling solutions of each patch, the ones near rest first."""
 
+MOST_CREEPAGE = 0.5
+"""Largest creepage of a rolling solution: small patches with high friction would need more to slide than a wheel that
+is locked."""
+
 MOST_FOUND = 4
 """Patches of one position that are kept."""
+
+END_MARGIN = 1e-3
+"""Distance of the end of a profile from the place across a patch, beside four sigma, m."""
 
 
 class Found(NamedTuple):
@@ -105,10 +112,11 @@ def _works():
 
 
 class ExactPatches:
-    """Finds the patches of a pair and solves them with exact contact at one coefficient of friction."""
+    """Finds the patches of a `WheelOnRail` and solves them with exact contact at one coefficient of friction."""
 
-    def __init__(self, geometry, friction):
-        self.model = _template()._replace(geometry=geometry, friction=float(friction))
+    def __init__(self, pair, friction):
+        self.pair = pair
+        self.model = _template()._replace(geometry=pair.geometry, friction=float(friction))
         self._handle, self._strips = Handle(self.model), new_strips()
         self._rows, self._row, self._sums = (
             np.zeros((MAX_PATCHES, PATCH_COLUMNS)),
@@ -133,6 +141,14 @@ class ExactPatches:
             Found(position, self._numbers[k].copy(), self._descriptors[k].copy(), PatchShape(*self._shapes[k]))
             for k in range(n)
         ]
+
+    def is_inside(self, found):
+        """Whether a patch is away from the ends of both profiles, where its overlap is cut off."""
+        wheel, rail, margin = self.pair.wheel.u, self.pair.rail.u, END_MARGIN + 4.0 * found.shape.sigma
+        return (
+            rail[0] + margin < found.shape.lateral < rail[-1] - margin
+            and wheel[0] + margin < found.numbers[PLACE] < wheel[-1] - margin
+        )
 
     def _press(self, found):
         """Sums of `press_lobe`, and the solutions (weight, frame, work) of which it is the mean; None if there is
@@ -187,7 +203,8 @@ class ExactPatches:
         return solved if all(np.isfinite(part).all() for part in solved) else None
 
     def _velocities(self, found, slip, angle, log_a, log_b, limit, points):
-        """Velocities (n, 6) of a wheel that rolls with these creepages over those of saturation at the ``slip``."""
+        """Velocities (n, 6), over that along the track, of a wheel that rolls with these creepages over those of
+        saturation at the ``slip``."""
         geometry, axle, numbers = self.model.geometry, found.position[2:], np.zeros(NUMBERS)
         numbers[columns.ANGLE] = angle
         numbers[columns.PLACE_X : columns.PLACE_Z + 1] = (
@@ -196,9 +213,11 @@ class ExactPatches:
         free = rolling_slip(numbers, axle[2], axle[0], geometry.half_distance, geometry.rolling_radius, 0.0, 0.0)
         kalker = np.array(coefficients_at(log_a - log_b, self.model.creep.table.kalker)[:2])
         unit = self.model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
+        creepages = np.clip(points / (kalker * unit), -MOST_CREEPAGE, MOST_CREEPAGE)
         velocities = np.empty((len(points), 6))
-        slide(free, tuple(slip), math.cos(angle), points / (kalker * unit), velocities)
-        return velocities
+        # `slide` adds creepages to a wheel whose speed without them is 1; they are meant over the wheel's speed
+        slide(free, tuple(slip), math.cos(angle), creepages / (1.0 - creepages[:, :1]), velocities)
+        return velocities / velocities[:, :1]
 
     def _corrections(self, found, slip, angle, b, numbers):
         """Corrections (N_CORRECTIONS,) with which `surrogate_wheel` finds this place and angle and these ``numbers``:
