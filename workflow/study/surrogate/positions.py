@@ -32,6 +32,9 @@ They cost a fifth of the time."""
 _ANGLES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.1])
 """Edges of the classes of contact angle over which patches are drawn evenly, rad."""
 
+_STEEP = 6
+"""First class of flanks (0.7 rad), whose patches are drawn twice as often: no twins are among them."""
+
 _DOUBLE = 1.8
 """Value of <e^4> below which a shape is called double; a parabolic overlap has 2.33 and two equal peaks 1."""
 
@@ -97,6 +100,7 @@ def _evenly(random, drawn, among, count):
         return []
     classes = np.digitize([abs(drawn[k].shape.angle) for k in among], _ANGLES)
     weights = 1.0 / np.maximum(np.bincount(classes, minlength=len(_ANGLES) + 1)[classes], 5.0)
+    weights *= np.where(classes >= _STEEP, 2.0, 1.0)
     return list(random.choice(among, count, replace=False, p=weights / weights.sum()))
 
 
