@@ -8,14 +8,14 @@ import pytest
 from study.surrogate import patches, shards
 from study.surrogate.pairs import Pair
 from study.surrogate.patches import Sampling, distances, make_shard, write_shards
-from study.surrogate.solution import POINTS, ExactPatches, random_points
+from study.surrogate.solution import POINTS, ExactPatches, random_points, unbounded
 from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact import reduction
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.surrogate.network import FORCE_CELLS, N_CORRECTIONS, Layers, Surrogate
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.surrogate_wheel import surrogate_wrenches
+from wrcore.dynamics.surrogate_wheel import bounded, surrogate_wrenches
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.handles import Handle
@@ -137,6 +137,12 @@ def test_farthest_candidate_is_kept(monkeypatch):
 def test_distance_is_to_the_nearest():
     np.testing.assert_allclose(distances([[1.0, 0.0]], [[0.0, 0.0], [1.0, 0.5]]), [0.5])
     assert np.isinf(distances([[1.0, 0.0]], np.zeros((0, 2)))).all()
+
+
+def test_unbounded_is_the_inverse_of_bounded():
+    for x in np.linspace(-0.57, 0.57, 41):
+        assert bounded(unbounded(x, 0.6), 0.6) == pytest.approx(x, abs=1e-12)
+    assert bounded(unbounded(5.0, 0.6), 0.6) == pytest.approx(0.57)
 
 
 def constant_surrogate(corrections, remainder):

@@ -40,6 +40,14 @@ from wrcore.dynamics.pair_node import (
     slide,
 )
 from wrcore.dynamics.pair_table import DISK
+from wrcore.dynamics.surrogate_wheel import (
+    _MOST_ANGLE,
+    _MOST_LOG_AXIS,
+    _MOST_LOG_LOAD,
+    _MOST_PLACE,
+    _MOST_WIDTH,
+    bounded,
+)
 from wrcore.dynamics.wheel import alone
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.handles import Handle
@@ -57,8 +65,9 @@ is locked."""
 MOST_FOUND = 4
 """Patches of one position that are kept."""
 
-END_MARGIN = 1e-3
-"""Distance of the end of a profile from the place across a patch, beside four sigma, m."""
+END_MARGIN = 2e-4
+"""Distance of the end of a profile from a patch, m. Patches that it cuts off have pressures ten times those of an
+ellipse."""
 
 
 class Found(NamedTuple):
@@ -95,6 +104,15 @@ def random_points(random, count=N_RANDOM):
     """Creepages (count, 2) over those of saturation, uniform over the disk of the force modes up to 0.965."""
     r, angle = 0.965 * np.sqrt(random.random(count)), 2.0 * math.pi * random.random(count)
     return 2.0 * DISK * np.stack([r * np.cos(angle), r * np.sin(angle)], 1) / (1.0 - r[:, None] ** 2)
+
+
+def unbounded(x, bound):
+    """Number that `wrcore.dynamics.surrogate_wheel.bounded` maps to x; beyond 0.95 of the bound to that."""
+    half = 0.5 * bound
+    over = min(abs(x), 0.95 * bound) - half
+    if not over > 0.0:
+        return x
+    return math.copysign(half + over / math.sqrt(1.0 - (over / half) ** 2), x)
 
 
 @lru_cache(maxsize=1)
@@ -144,7 +162,8 @@ class ExactPatches:
 
     def is_inside(self, found):
         """Whether a patch is away from the ends of both profiles, where its overlap is cut off."""
-        wheel, rail, margin = self.pair.wheel.u, self.pair.rail.u, END_MARGIN + 4.0 * found.shape.sigma
+        half_width = 3.0 * found.shape.sigma * math.cos(found.shape.angle)  # a parabolic overlap ends at 2.65 sigma
+        wheel, rail, margin = self.pair.wheel.u, self.pair.rail.u, END_MARGIN + half_width
         return (
             rail[0] + margin < found.shape.lateral < rail[-1] - margin
             and wheel[0] + margin < found.numbers[PLACE] < wheel[-1] - margin
@@ -225,20 +244,20 @@ class ExactPatches:
         shape, base, y = found.shape, found.numbers, found.position[0]
         lateral = slip[1] + y - self.model.geometry.rail_distance - shape.lateral
         e = lateral / (shape.sigma * math.cos(shape.angle))
-        spread = 0.2 * (b / shape.sigma) ** 2
+        spread = bounded(0.2 * (b / shape.sigma) ** 2, 2.0 * _MOST_WIDTH)
         of_angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)
         ahead = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread)
         height = parabola_at(shape.height, shape.height_1, shape.height_2, shape.third, e, spread)
         load, log_a, log_b, log_peak = numbers
         return np.array(
             [
-                load - math.log(base[LOAD]),
-                log_a - base[LOG_A],
-                log_b - base[LOG_B],
-                log_peak - math.log(base[P_MAX]),
-                (slip[0] - ahead) / shape.length,
-                e * shape.sigma / shape.length,
-                angle - of_angle,
-                (slip[2] - height) / shape.length,
+                unbounded(load - math.log(base[LOAD]), _MOST_LOG_LOAD),
+                unbounded(log_a - base[LOG_A], _MOST_LOG_AXIS),
+                unbounded(log_b - base[LOG_B], _MOST_LOG_AXIS),
+                unbounded(log_peak - math.log(base[P_MAX]), 2.0 * _MOST_LOG_AXIS),
+                unbounded((slip[0] - ahead) / shape.length, 1.0),
+                unbounded(e, _MOST_PLACE) * shape.sigma / shape.length,
+                unbounded(angle - of_angle, _MOST_ANGLE),
+                unbounded((slip[2] - height) / shape.length, 1.0),
             ]
         )
