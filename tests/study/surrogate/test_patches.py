@@ -28,6 +28,7 @@ def few_patches():
     """Six patches of a pair at some forty positions, so that the tests are quick."""
     with pytest.MonkeyPatch.context() as context:
         context.setattr(patches, "PAIR_PATCHES", 6)
+        context.setattr(patches, "UNSOLVED_PATCHES", 6)
         context.setattr(patches, "LEAST_DRAWN", 6)
         draw = patches.draw_positions
         context.setattr(patches, "draw_positions", lambda random, exact: draw(random, exact, 40))

@@ -34,7 +34,10 @@ from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
 from wrcore.errors import InputError
 
 PAIR_PATCHES = 60
-"""Patches of each pair of profiles."""
+"""Patches of each pair of profiles that are solved."""
+
+UNSOLVED_PATCHES = 600
+"""The same where they are not solved: then the positions of a pair cost most of the time."""
 
 SHARD_PATCHES = 400
 """Patches of a shard: some 10 s of one processor core."""
@@ -126,8 +129,9 @@ def _solved(random, exact, found, is_solved):
 def pair_patches(random, candidate, sampling, number):
     """Rows (dict) of the patches of a pair, twins one after the other, and how many had no solution."""
     exact, rows, failed = candidate.exact, [], 0
-    n = int(round(0.5 * TWINS * PAIR_PATCHES))
-    singles = choose(random, candidate.drawn, PAIR_PATCHES - 2 * n)
+    count = PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES
+    n = int(round(0.5 * TWINS * count))
+    singles = choose(random, candidate.drawn, count - 2 * n)
     groups = [((one,), 0.0) for one in singles]
     groups += [((one, twin), step) for one, twin, step in choose_twins(random, exact, candidate.drawn, n)]
     for patches, step in groups:
