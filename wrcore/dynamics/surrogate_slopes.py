@@ -106,7 +106,7 @@ def _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
         lift = lift_of_group(contact, m, moving, is_spatial, lean, rows, first, last, work.moments)
         if n == _LIFTED:
             lift = Lift(lift.share + DIFFERENCE / lift.depth, lift.depth, lift.cosine, lift.sine)
-        p = press_patch(contact, m, is_spatial, True, lean, lift, rows, 0, row, surrogate)
+        p = press_patch(contact, m, is_spatial, lean, lift, rows, 0, row, surrogate)
         if not p.load > 0.0:
             return False
         numbers = surrogate.numbers[n]

@@ -27,7 +27,7 @@ from wrcore.contact.surrogate.network import force_remainder, run_network
 from wrcore.contact.surrogate.strips import fill_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.lift import lift_of
-from wrcore.dynamics.modes import FRESH, PATCHES_ONLY, WARM
+from wrcore.dynamics.modes import FRESH, PATCHES_ONLY
 from wrcore.dynamics.motion import WheelMotion, as_left, motion_of
 from wrcore.dynamics.pair_table import APART, DISK, FAR, LOCKED, SADDLE, _at_ellipse, lobe_end
 from wrcore.dynamics.strip_wheel import copy_deepest, mirror
@@ -133,10 +133,9 @@ def _lifted_wheel(m, lift, rise, tilt, ellipse):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def press_patch(model, m, is_spatial, is_precise, lean, lift, rows, q, row, work):
+def press_patch(model, m, is_spatial, lean, lift, rows, q, row, work):
     """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel; ``row``
-    (PATCH_COLUMNS,) becomes its deepest overlap. ``work.network.outputs`` become those of the patch, in double
-    precision where ``is_precise``."""
+    (PATCH_COLUMNS,) becomes its deepest overlap. ``work.network.outputs`` become those of the patch."""
     geometry, network, forces = model.geometry, work.network, work.forces
     first, last, tilt = forces.first[q], forces.last[q], forces.tilt[q]
     copy_deepest(rows, first, last, row)
@@ -150,9 +149,7 @@ def press_patch(model, m, is_spatial, is_precise, lean, lift, rows, q, row, work
     shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, network.descriptors)
     if not shape.square > 0.0:
         return _NO_CONTACT
-    p = _pressed(
-        model, shape, run_network(model.surrogate, network, is_precise), model.surrogate.corrections, network.outputs
-    )
+    p = _pressed(model, shape, run_network(model.surrogate, network), model.surrogate.corrections, network.outputs)
     px, pz = leaning(geometry, lean, p.px, p.pz + tz)
     return Pressed(
         p.load, p.log_a, p.log_b, p.p_max, px, p.py + geometry.rail_distance - y + ty, pz, p.angle - 0.5 * tilt, p.trust
@@ -307,9 +304,7 @@ def lift_of_group(model, m, moving, is_spatial, lean, rows, first, last, moments
 
 
 @jit(allocates=False, fastmath=FUSED)
-def group_forces(
-    model, m, is_spatial, is_precise, rows, first, last, kept, wrench, counters, moments, scratch_rows, work
-):
+def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, moments, scratch_rows, work):
     """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
     ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten. ``moments``
     (3, 5) and ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) are scratch."""
@@ -321,7 +316,7 @@ def group_forces(
     rounds = 1 if count == 1 else _ROUNDS
     for turn in range(rounds):
         for q in range(count):
-            p = press_patch(model, m, is_spatial, is_precise, lean, lift, rows, q, scratch_rows[q], work)
+            p = press_patch(model, m, is_spatial, lean, lift, rows, q, scratch_rows[q], work)
             forces.load[q] = p.load
             if not p.load > 0.0:
                 continue
@@ -355,14 +350,12 @@ def mirror_back(rows, count, wrench):
 
 @jit(allocates=False, fastmath=FUSED)
 def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counters, scratch, mode=FRESH):
-    """Force and moment of the rails on all wheels; arguments as for `wrcore.dynamics.wheel.wheel_wrenches`.
-
-    Within a step (`WARM`) the network is evaluated in single precision."""
+    """Force and moment of the rails on all wheels; arguments as for `wrcore.dynamics.wheel.wheel_wrenches`."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
             seen = motion_of(motions[i, wheel])
-            m, is_precise = left_ahead(seen), mode & WARM == 0
+            m = left_ahead(seen)
             wrench[:] = 0.0
             count, bound, is_spatial = detect_patches(contact, m, rows)
             if not mode & PATCHES_ONLY:
@@ -370,7 +363,7 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
                 while first < count:
                     last = group_end(contact.geometry, rows, count, first)
                     kept = group_forces(
-                        contact, m, is_spatial, is_precise, rows, first, last, kept, wrench, counters,
+                        contact, m, is_spatial, rows, first, last, kept, wrench, counters,
                         scratch.moments, scratch.rows, scratch.surrogate,
                     )  # fmt: skip
                     first = last

@@ -15,10 +15,10 @@ def surrogate():
     return network.load_surrogate()
 
 
-def outputs_at(surrogate, descriptors, is_precise=True):
+def outputs_at(surrogate, descriptors):
     work = network.surrogate_work(surrogate)
     work.descriptors[:] = descriptors
-    trust = network.run_network(surrogate, work, is_precise)
+    trust = network.run_network(surrogate, work)
     return trust, work.outputs.copy()
 
 
@@ -26,16 +26,15 @@ def test_outputs_are_those_of_the_layers_in_numpy(surrogate):
     random = np.random.default_rng(1)
     descriptors = surrogate.median + 0.3 / surrogate.per_scale * random.normal(size=N_DESCRIPTORS)
     descriptors = np.clip(descriptors, surrogate.least, surrogate.greatest)
-    x, layers = (descriptors - surrogate.median) * surrogate.per_scale, surrogate.double
+    x, layers = (descriptors - surrogate.median) * surrogate.per_scale, surrogate.layers
     x = x / (1.0 + x * x) ** 0.25
     for k in (1, 2, 3):
         x = x @ getattr(layers, f"weights_{k}") + getattr(layers, f"biases_{k}")
         x = 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0))
     expected = x @ layers.weights_4 + layers.biases_4
-    for is_precise, error in ((True, 1e-12), (False, 1e-5)):
-        trust, found = outputs_at(surrogate, descriptors, is_precise)
-        assert trust == 1.0
-        np.testing.assert_allclose(found, expected, rtol=error, atol=error)
+    trust, found = outputs_at(surrogate, descriptors)
+    assert trust == 1.0
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_splines_are_the_force_modes(surrogate):
@@ -44,7 +43,7 @@ def test_splines_are_the_force_modes(surrogate):
     random = np.random.default_rng(2)
     r, angle = 0.95 * np.sqrt(random.random(200)), random.uniform(0.0, 2.0 * math.pi, 200)
     p, q = r * np.cos(angle), r * np.sin(angle)
-    modes, outputs = network.force_modes(z, p, q), 0.3 * random.normal(size=len(surrogate.double.biases_4))
+    modes, outputs = network.force_modes(z, p, q), 0.3 * random.normal(size=len(surrogate.layers.biases_4))
     found = np.array([network.force_remainder(surrogate, outputs, *place) for place in zip(p, q, strict=True)])
     expected = modes @ outputs[network.N_CORRECTIONS :]
     assert np.abs(expected).max() > 5e-3  # of friction times load

@@ -70,7 +70,7 @@ def test_teacher_in_numpy_is_the_network_of_the_package():
     corrections, forces = taught(weights, descriptors, disk)
     work = network.surrogate_work(surrogate)
     work.descriptors[:] = descriptors[0]
-    assert network.run_network(surrogate, work, True) == 1.0
+    assert network.run_network(surrogate, work) == 1.0
     np.testing.assert_allclose(corrections[0], work.outputs[:8] * surrogate.corrections, rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(run_teacher(weights, descriptors)[1][0], work.outputs[8:], rtol=1e-5, atol=1e-6)
     expected = [network.force_remainder(surrogate, work.outputs, *place) for place in disk[0]]
@@ -84,7 +84,7 @@ def test_weights_have_the_arrays_of_the_package(trained, monkeypatch):
     for name, array in known.items():
         assert weights[name].dtype == array.dtype and weights[name].ndim == array.ndim, name
     surrogate = loaded(out, monkeypatch)
-    assert surrogate.modes.shape[-1] == SMALL["modes"] and len(surrogate.double.biases_1) == SMALL["width"]
+    assert surrogate.modes.shape[-1] == SMALL["modes"] and len(surrogate.layers.biases_1) == SMALL["width"]
 
 
 def test_loaded_weights_give_what_was_trained(training, trained, random_shards, monkeypatch):
@@ -96,7 +96,7 @@ def test_loaded_weights_give_what_was_trained(training, trained, random_shards, 
     work = network.surrogate_work(surrogate)
     descriptors = data.scaling.median + 0.2 * data.scaling.scale
     work.descriptors[:] = descriptors
-    network.run_network(surrogate, work, True)
+    network.run_network(surrogate, work)
     disk = data.training.disk[:1].copy()
     corrections, forces = training.predict(state.parameters, data.scaling.compressed(descriptors[None]), disk)
     found = work.outputs[:8] * surrogate.corrections
