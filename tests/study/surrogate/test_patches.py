@@ -151,12 +151,12 @@ def constant_surrogate(corrections, remainder):
     biases = np.concatenate([corrections, remainder])
     sizes = 38, 8, 8, 8, len(biases)
     shapes = [shape for a, b in zip(sizes[:-1], sizes[1:], strict=True) for shape in ((a, b), (b,))]
-    double, single = (Layers(*(np.zeros(shape, kind) for shape in shapes)) for kind in (float, np.float32))
+    layers = Layers(*(np.zeros(shape) for shape in shapes))
     modes = np.zeros((FORCE_CELLS + 2, FORCE_CELLS + 2, 3, 3), np.float32)
     modes[:, :, range(3), range(3)] = 1.0
     ones = np.ones(38)
-    return Surrogate(0 * ones, ones, -ones, ones, 0 * ones, double._replace(biases_4=biases),
-                     single._replace(biases_4=biases.astype(np.float32)), np.ones(N_CORRECTIONS), modes)  # fmt: skip
+    return Surrogate(0 * ones, ones, -ones, ones, 0 * ones, layers._replace(biases_4=biases), np.ones(N_CORRECTIONS),
+                     modes)  # fmt: skip
 
 
 def row_of(geometry, position, velocity, friction, surrogate, monkeypatch):
