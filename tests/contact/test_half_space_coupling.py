@@ -1,4 +1,4 @@
-"""What patches do to each other through the half-space, against sums over their pressures and tractions."""
+"""Rise and slip of one patch by another one through the half-space, against sums over pressures and tractions."""
 
 import math
 
@@ -54,3 +54,14 @@ def test_slip_by_friction_is_the_fall_of_the_displacement_along_x(fx, fy):
     expected = [-np.mean(a - b) / (2.0 * h) for a, b in zip(ahead, back, strict=True)]
     found = slip_by_friction(NU, ONE, OTHER, fx, fy, 0.0)
     np.testing.assert_allclose(found, expected, atol=0.03 * np.abs(expected).max())
+
+
+def test_slip_by_a_moment_is_that_of_forces_across():
+    """On a slender patch a friction moment is one of forces across it: positive ahead, negative behind."""
+    one, slender, h = ONE._replace(a=1e-3, b=1e-3), Ellipse(0.0, 1.4e-2, 0.0, 4e-3, 3e-4, 1.0, 0.0), 1e-5
+    p, q = points(one, "hertz", 16), points(slender, "hertz", 16)
+    d, share = p[:, None] - q[None], q[:, 0] / np.sum(q[:, 0] ** 2)  # of 1 N m
+    ahead, back = (cerruti(d[..., 0] + s * h, d[..., 1], 0.0, share)[1] for s in (1.0, -1.0))
+    expected = -np.mean(np.sum(ahead - back, axis=1)) / (2.0 * h)
+    xi, eta = slip_by_friction(NU, one, slender, 0.0, 0.0, 1.0)
+    assert xi == 0.0 and eta == pytest.approx(expected, rel=0.15)

@@ -57,7 +57,7 @@ def parser():
     return whole
 
 
-GARBAGE = 300_000
+GARBAGE = 100_000
 """New objects until Python looks for garbage. With its 700 it looks 700 times while a run's modules are imported, a
 tenth of that time."""
 

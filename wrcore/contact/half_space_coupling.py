@@ -1,4 +1,4 @@
-"""What the load and the friction of one contact patch do to another one on the same half-space.
+"""Rise and slip of a contact patch by the load and the friction of another one on the same half-space.
 
 The pressure of one patch lifts the other by Boussinesq's formula, and tilts it, because the near side rises by more.
 Friction gives it a rigid slip by Cerruti's formula: the slope of the surface displacement along x (K. L. Johnson,
@@ -24,7 +24,7 @@ _PUNCH_PLACES, _PUNCH_PARTS = np.array([-1.0, 0.0, 1.0]) * math.sqrt(0.6), np.ar
 
 
 class Ellipse(NamedTuple):
-    """Where a patch is and how large: all that others feel of its form."""
+    """Place and size of a patch: all that other patches feel of its form."""
 
     x: float
     y: float
@@ -35,7 +35,7 @@ class Ellipse(NamedTuple):
     """Semi-axes along and across, m."""
     cosine: float
     sine: float
-    """Of its contact angle."""
+    """Cosine and sine of its contact angle."""
 
 
 @jit(allocates=False, forceinline=True)

@@ -1,20 +1,13 @@
 """Lobes that are apart, looked up one by one: what they do to each other through the half-space.
 
-The others' pressure lifts a lobe, by Boussinesq's formula, and tilts it, as it lifts the near side by more; their
-friction lets it slip, by Cerruti's and the displacement's slope over x (K. L. Johnson, Contact Mechanics, 3.2, 3.6).
-A lift changes a lobe's load by its mean over the pressure under a rigid punch (Betti's theorem), so that
-
-    w_i = sum of N_j / (pi E*) times the mean of 1/r,
-
-over Hertz's pressure on lobe j and a punch's on lobe i: along x at Gauss's points, across to second
-order. A tilted lobe is one of a wheel that rolls by so much about it.
+The others' pressure lifts a lobe and tilts it, and their friction lets it slip, as
+:mod:`wrcore.contact.half_space_coupling` has it. A tilted lobe is one of a wheel that rolls by so much about it.
 """
 
 import math
 
-import numpy as np
-
 from wrcore.contact import reduction
+from wrcore.contact.half_space_coupling import Ellipse, rise_by_pressure, slip_by_friction
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.dynamics import pair_table as columns
@@ -32,10 +25,6 @@ STEPS = 6
 
 USUAL, LONG, BROAD = math.log(0.85), 0.75, 0.6
 """ln(N / (E* D^1.5)) of a lobe on the tread that is not known yet, and its semi-axes over those of its overlap."""
-
-LOADED, LOADED_PART = np.array([-1.0, 0.0, 1.0]) * math.sqrt(3.0 / 7.0), np.array([7.0, 16.0, 7.0]) / 30.0
-PUNCHED, PUNCHED_PART = np.array([-1.0, 0.0, 1.0]) * math.sqrt(0.6), np.array([5.0, 8.0, 5.0]) / 18.0
-"""Places along x over the half length, and weights, of Hertz's pressure and of a punch's."""
 
 
 @jit(allocates=False, forceinline=True)
@@ -89,22 +78,13 @@ def guess_lobes(model, pose, axle_y, axle_z, low, count, work):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _rise(one, other):
-    """Mean of 1/r between two lobes, and its slope over s of the first."""
-    dx, dy = one[columns.PLACE_X] - other[columns.PLACE_X], one[columns.PLACE_Y] - other[columns.PLACE_Y]
-    dz = one[columns.PLACE_Z] - other[columns.PLACE_Z]
-    square, value, rate = dy * dy + dz * dz, 0.0, 0.0
-    a, b, own = math.exp(other[columns.LOG_A]), math.exp(2.0 * other[columns.LOG_B]), math.exp(one[columns.LOG_A])
-    own_b = math.exp(2.0 * one[columns.LOG_B])
-    spread = 0.5 * (0.2 * b + own_b / 3.0)
-    for m in range(3):
-        for n in range(3):
-            x = dx + PUNCHED[m] * own - LOADED[n] * a
-            inverse2 = 1.0 / (square + x * x)
-            part = PUNCHED_PART[m] * LOADED_PART[n] * math.sqrt(inverse2)
-            value += part * (1.0 + spread * inverse2 * (3.0 * square * inverse2 - 1.0))
-            rate += part * inverse2 * (1.0 + 0.6 * own_b * inverse2)
-    return value, -rate * (dy * math.cos(one[columns.ANGLE]) + dz * math.sin(one[columns.ANGLE]))
+def _ellipse(numbers):
+    """The `Ellipse` of a lobe."""
+    angle = numbers[columns.ANGLE]
+    return Ellipse(
+        numbers[columns.PLACE_X], numbers[columns.PLACE_Y], numbers[columns.PLACE_Z], math.exp(numbers[columns.LOG_A]),
+        math.exp(numbers[columns.LOG_B]), math.cos(angle), math.sin(angle),
+    )  # fmt: skip
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -116,7 +96,7 @@ def balance(model, y, low, count, work):
     for i in range(count):
         for j in range(count):
             if j != i:
-                value, rate = _rise(numbers[i], numbers[j])
+                value, rate = rise_by_pressure(_ellipse(numbers[i]), _ellipse(numbers[j]))
                 lobes[i, RISE + j], lobes[i, TURN + j] = unit * value, unit * rate
     for _ in range(STEPS):
         for i in range(count):
@@ -133,46 +113,15 @@ def balance(model, y, low, count, work):
             first = last
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _fall(nu, one, other):
-    """Mean fall over x, on the first lobe, of the displacements by friction on the other, times pi G: along x by a
-    force along x, across by one across and by a moment, and either by the other force."""
-    dx, dy = one[columns.PLACE_X] - other[columns.PLACE_X], one[columns.PLACE_Y] - other[columns.PLACE_Y]
-    dz = one[columns.PLACE_Z] - other[columns.PLACE_Z]
-    square, own, a = dy * dy + dz * dz, math.exp(one[columns.LOG_A]), math.exp(other[columns.LOG_A])
-    spread = 0.2 * (math.exp(2.0 * one[columns.LOG_B]) + math.exp(2.0 * other[columns.LOG_B]))
-    along = across = turned = aslant = 0.0
-    for m in range(3):
-        for n in range(3):
-            x = dx + LOADED[m] * own - LOADED[n] * a
-            inverse2 = 1.0 / (square + x * x)
-            part = LOADED_PART[m] * LOADED_PART[n] * inverse2 * math.sqrt(inverse2)
-            ahead = x * x * inverse2
-            along += part * x * ((1.0 - nu) - nu * (2.0 - 3.0 * ahead))
-            across += part * x * ((1.0 - nu) + 3.0 * nu * (1.0 - ahead))
-            turned -= part * ((1.0 - nu) + 3.0 * nu * (1.0 - ahead))
-            aslant -= part * nu * (1.0 - 3.0 * ahead)
-    return along, across, turned, aslant * math.copysign(math.sqrt(square), dy) * (1.0 + 3.0 * spread / square)
-
-
-@jit(allocates=False, forceinline=True)
-def _twist(numbers):
-    """Share of friction's moment on a lobe that forces across make: all of it where it is slender."""
-    ratio = math.exp(2.0 * (numbers[columns.LOG_B] - numbers[columns.LOG_A]))
-    return max(1.0 - ratio, 0.0) / (1.0 + ratio)
-
-
 @jit(allocates=False, fastmath=FUSED)
 def slip_of_others(model, i, count, work):
     """Creepages of a lobe by the friction on the others."""
     lobes, unit, xi, eta = work.lobes, 1.0 / (math.pi * model.shear_modulus), 0.0, 0.0
     for j in range(count):
         if j != i and lobes[j, NORMAL] > 0.0:
-            along, across, turned, aslant = _fall(model.poisson_ratio, work.numbers[i], work.numbers[j])
-            xi += unit * (along * lobes[j, FORCE_X] + aslant * lobes[j, FORCE_S])
-            eta += unit * (
-                across * lobes[j, FORCE_S]
-                + turned * _twist(work.numbers[j]) * lobes[j, MOMENT]
-                + aslant * lobes[j, FORCE_X]
-            )
+            x, y = slip_by_friction(
+                model.poisson_ratio, _ellipse(work.numbers[i]), _ellipse(work.numbers[j]), lobes[j, FORCE_X],
+                lobes[j, FORCE_S], lobes[j, MOMENT],
+            )  # fmt: skip
+            xi, eta = xi + unit * x, eta + unit * y
     return xi, eta

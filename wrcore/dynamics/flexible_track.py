@@ -81,6 +81,7 @@ class FlexibleTrackWork(NamedTuple):
     parts: np.ndarray  # (k, 2): of Newton's full steps
     power: np.ndarray  # (1,): f q', summed over all rails, W; 0 for a rigid track
     unbalanced: np.ndarray  # (1,) int: counts evaluations in which rails without mass found no balance
+    counted: np.ndarray  # (COUNTERS,) int: the wheels' counters where an evaluation began
 
 
 def rigid_track():
@@ -97,7 +98,8 @@ def track_work(track, wheelsets):
     """Scratch arrays for a `FlexibleTrack` and a number of wheelsets."""
     k = wheelsets if len(track.mass) else 0
     shapes = [(k, RAILS)] * 7 + [(k, RAILS, 2), (k, 2, 2, 2), (k, 2, 2, 2), (k, RAILS, 6), (k, 2), (k, 2), (1,)]
-    return FlexibleTrackWork(*(np.zeros(shape) for shape in shapes), np.zeros(1, np.int64))
+    counts = (np.zeros(size, np.int64) for size in (1, COUNTERS))
+    return FlexibleTrackWork(*(np.zeros(shape) for shape in shapes), *counts)
 
 
 def track_places(model):
@@ -155,15 +157,15 @@ def _find_wrenches(model, state, work, mode):
                 scratch.speeds[k, i] = state[at + model.flexible_track.mass.shape[0]]
             elif not given:
                 scratch.speeds[k, i] = 0.0
-    c = work.counters
-    counted = c[0], c[1], c[2], c[3], c[4], c[5]
+    for k in range(COUNTERS):
+        scratch.counted[k] = work.counters[k]
     _press(model, work, -1, mode)
     if massless and given:
         _step_on(model, state, work)
     elif massless:
         if _follow_where_sliding(model, work):
             _press(model, work, -1, mode | PATCHES_HELD)
-        _give_way(model, state, work, counted, mode)
+        _give_way(model, state, work, mode)
     scratch.power[0] = 0.0
     for k in range(scratch.speeds.shape[0]):
         at = first_place(model, k)
@@ -320,8 +322,8 @@ def _moves(scratch, k, wheel):
 
 
 @jit(allocates=False)
-def _give_way(model, state, work, counted, mode):
-    """Find the speeds of rails without mass, with all wrenches there; the counters start from ``counted`` each time."""
+def _give_way(model, state, work, mode):
+    """Find the speeds of rails without mass, with all wrenches there; each evaluation counts from ``counted`` on."""
     track, scratch, differences = model.flexible_track, work.flexible_track, True
     scratch.left[:] = math.inf
     for n in range(MOST_STEPS):
@@ -335,7 +337,7 @@ def _give_way(model, state, work, counted, mode):
                     differences |= _step(track, scratch, k, wheel, fresh)
                     moving |= _moves(scratch, k, wheel)
         for k in range(COUNTERS):
-            work.counters[k] = counted[k]
+            work.counters[k] = scratch.counted[k]
         _press(model, work, -1, mode | PATCHES_HELD)
         if not moving:
             break

@@ -1,4 +1,4 @@
-"""What the wrench by the surrogate changes by where a wheel moves: its slopes over pose and velocity.
+"""Slopes of the wrench by the surrogate over position and velocity of a wheel.
 
 A pose moves the overlap, and with it all numbers of a patch (`Pressed`) and the network's outputs. A velocity changes
 them only as the damping lifts the wheel by more or less. These numbers are therefore found six times: as they are,
@@ -30,7 +30,8 @@ from wrcore.dynamics.wheel import contact_of, detect_patches, leaning_motion
 from wrcore.kernels.jit import FUSED, jit
 
 DIFFERENCE, RATE_DIFFERENCE = 1e-9, 1e-8
-"""Of moves (m, rad) and of the lift (m); of velocities (m/s, rad/s) over the rolling speed (m/s)."""
+"""Differences of moves (m, rad) and of the lift (m), and those of velocities (m/s, rad/s) over the rolling speed
+(m/s)."""
 
 _LIFTED = 1 + MOVES
 """Row of a lifted wheel among the numbers of a patch, after those as it is and after each move."""

@@ -70,7 +70,7 @@ class Pressed(NamedTuple):
     """Normal force, N; 0 if it does not touch."""
     log_a: float
     log_b: float
-    """Of the semi-axes over 1 m."""
+    """Logarithms of the semi-axes over 1 m."""
     p_max: float
     """Largest pressure, Pa."""
     px: float

@@ -136,7 +136,7 @@ def with_laws(elements):
     """The elements with the addresses of the laws that they follow: these alone are compiled."""
     addresses, example = np.zeros(len(law.LAWS), np.int64), Kind(elements)
     own = np.zeros(len(elements.own), np.int64)
-    for number in sorted(set(elements.law[:, law.LAW].tolist())):
+    for number in np.unique(elements.law[:, law.LAW]):
         if number >= 0:
             addresses[number] = Kernel(law.LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
         else:

@@ -121,8 +121,6 @@ def _plain(value):
 
 def is_masked(value, depth=4):
     """Whether an array, or one in a list of lists to a ``depth``, has masked values."""
-    if "numpy.ma" not in sys.modules:  # it takes 10 ms, and without it there are none
-        return False
     if isinstance(value, list | tuple):
         inner = [item for item in value if isinstance(item, np.ma.MaskedArray | list | tuple)] if depth else []
         return any(is_masked(item, depth - 1) for item in inner)

@@ -173,8 +173,7 @@ def look_up_errors(contact, patches):
         return dict.fromkeys(LOOK_UP_ERRORS, 0.0)
     wheels = values_of(contact.wheels) or (contact,) * (2 * patches.shape[1])
     cells = np.nan_to_num(patches[..., reduction.CELL]).astype(int).reshape(len(patches), -1, reduction.MAX_PATCHES)
-    met = [np.flatnonzero(np.bincount(cells[:, i].ravel())) for i in range(len(wheels))]
-    misses = [one.strips.table.misses[numbers] for one, numbers in zip(wheels, met, strict=True)]
+    misses = [one.strips.table.misses[np.unique(cells[:, i])] for i, one in enumerate(wheels)]
     normal, force, pressure, left = np.vstack([np.zeros((1, 4)), *misses]).T
     return {
         name: float(error.max()) for name, error in zip(LOOK_UP_ERRORS, (normal, force + left, pressure), strict=True)

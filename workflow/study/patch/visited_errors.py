@@ -5,8 +5,8 @@ evaluated at the run's state, so that wheels have the same place and motion. Err
 the creep force over mu N (%), of its moment over mu N c (%) and of p_max (%) of each wheel's heaviest patch; of the
 force on the wheel along the normal of that patch (%) and across it, over mu N (%), which also tells of wheels whose
 patches one model puts together and the other one does not.
-``outside``: share of wheels that the table left to the solver, which do not count in the errors, or that lie outside
-the surrogate's training, which do.
+``outside``: share of wheels at times when the table left a patch to the solver, which do not count in the errors, or
+when a patch lay far outside the surrogate's training, which do.
 """
 
 import argparse

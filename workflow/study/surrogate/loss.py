@@ -28,7 +28,7 @@ TWIN_ERRORS = np.array([0.3, 0.15, 0.15, 0.5, 0.3, 0.3, 0.15, 0.1])
 """Difference of the errors of twins that counts as one, over the errors that do."""
 
 TWIN_FORCE_ERRORS = np.array([0.06, 0.06, 0.1])
-"""The same of the forces near rest."""
+"""Difference of the errors of twins in the forces near rest that counts as one."""
 
 REST_WEIGHT, DISK_WEIGHT, SLOPE_WEIGHT, TWIN_WEIGHT = 0.6, 1.4, 0.3, 0.5
 

@@ -15,8 +15,8 @@ from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import list_profiles, named_profile
 
 
-class TestPair(NamedTuple):
-    """A pair that judges the network, and that training must not contain."""
+class NamedPair(NamedTuple):
+    """Names of the profiles of a pair."""
 
     wheel: str
     rail: str
@@ -25,17 +25,18 @@ class TestPair(NamedTuple):
 
 
 TEST_PAIRS = (
-    TestPair("Car7216_0001r.whl", "60E1", 1 / 40),
-    TestPair("Car7358_0001r.whl", "60E1", 1 / 20),
-    TestPair("Car7422_0001r.whl", "60E2", 1 / 40),
-    TestPair("Car7813_0001r.whl", "avg_low2.ban", None),
-    TestPair("avg_wheel.whl", "avg_HR.BAN", None),
-    TestPair("Car7216_0001r.whl", "avg_low2.ban", None),
-    TestPair("S1002 hollow by 1 mm at 0 mm over 15 mm", "UIC60-MBench", 1 / 40),
-    TestPair("S1002", "54E1", 1 / 40),
-    TestPair("worn_high_mileage.prw", "UIC60-MBench", 1 / 40),
+    NamedPair("Car7216_0001r.whl", "60E1", 1 / 40),
+    NamedPair("Car7358_0001r.whl", "60E1", 1 / 20),
+    NamedPair("Car7422_0001r.whl", "60E2", 1 / 40),
+    NamedPair("Car7813_0001r.whl", "avg_low2.ban", None),
+    NamedPair("avg_wheel.whl", "avg_HR.BAN", None),
+    NamedPair("Car7216_0001r.whl", "avg_low2.ban", None),
+    NamedPair("S1002 hollow by 1 mm at 0 mm over 15 mm", "UIC60-MBench", 1 / 40),
+    NamedPair("S1002", "54E1", 1 / 40),
+    NamedPair("worn_high_mileage.prw", "UIC60-MBench", 1 / 40),
 )
-"""File names are those of the test bank of CONTACT (measured profiles); they are not part of the project."""
+"""Pairs on which the network is tested, and which its training must not contain. File names are those of the test bank
+of CONTACT (measured profiles); they are not part of the project."""
 
 WHEELS, RAILS = (
     tuple(row["name"] for row in list_profiles() if row["kind"] == kind and ":" not in row["name"])

@@ -37,7 +37,7 @@ PAIR_PATCHES = 60
 """Patches of each pair of profiles that are solved."""
 
 UNSOLVED_PATCHES = 600
-"""The same where they are not solved: then the positions of a pair cost most of the time."""
+"""Patches of each pair where they are not solved: then the positions of a pair cost most of the time."""
 
 SHARD_PATCHES = 400
 """Patches of a shard: some 10 s of one processor core."""

@@ -45,7 +45,7 @@ _KEEP_EVERY = 30.0
 
 
 class Settings(NamedTuple):
-    """What the weights depend on, beside the data and the time."""
+    """Settings on which the weights depend, beside the data and the time."""
 
     width: int = 128
     modes: int = 48

@@ -18,7 +18,7 @@ class PatchForces(NamedTuple):
     """int64: overlaps of the patch, from ``first`` to before ``last``."""
     rise: np.ndarray
     tilt: np.ndarray
-    """What the other patches lift it by (m), and the slope of that across it."""
+    """Rise of the patch by the other patches (m), and the slope of that across it."""
     slip_xi: np.ndarray
     slip_eta: np.ndarray
     """Creepages by the friction on the others."""

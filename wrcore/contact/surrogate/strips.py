@@ -110,7 +110,7 @@ def _fill_nodes(nodes, first, stride, wheel, rail, pose, reach, strips):
 
 @jit(allocates=False, fastmath=FUSED)
 def _fill_one_by_one(geometry, nodes, first, stride, pose, strips):
-    """The same for any pose, and for rails that change along the track or wheels out of round; some times as slow."""
+    """As `_fill_nodes` for any position, for rails that change along the track and wheels out of round; slower."""
     n = (nodes.end - first + stride - 1) // stride
     for k in range(n):
         u = nodes.u + nodes.step * (first + stride * k)

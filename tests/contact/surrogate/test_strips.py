@@ -1,0 +1,65 @@
+"""Strips of a patch: those of wide overlaps, of which some nodes are left out, beside all of them one by one."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.contact.detection import find_patches
+from wrcore.contact.moved import smooth_nodes
+from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
+from wrcore.contact.strip import make_pose
+from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, describe
+from wrcore.contact.surrogate.strips import ENOUGH, _add_end, _fill_one_by_one, fill_strips, new_strips
+from wrcore.dynamics.vector import copy_into
+from wrcore.kernels.handles import Handle
+from wrcore.kernels.jit import jit
+from wrcore.scene.description import load_scene
+
+YAW = 2e-3
+
+
+@jit(allocates=False)
+def both(geometry, y, z, rows, row, strips, every, out):
+    """Fill descriptors of the first overlap with the strips that are taken, and with those at all of its nodes; returns
+    the numbers of nodes."""
+    along = math.sqrt(1.0 - YAW * YAW)
+    pose = make_pose(1.0, y, z, -YAW, along, 0.0, True)
+    if find_patches(geometry, 1.0, y, z, -YAW, along, 0.0, True, MOMENT, rows) != 1:
+        return 0, 0
+    copy_into(row, rows[0])
+    count, n = fill_strips(geometry, pose, row, rows[0, OUTSIDE], rows[0, BEYOND], strips)
+    describe(strips, count, n, geometry.rolling_radius, 0.0, 0.3, out[0])
+    nodes, _, _ = smooth_nodes(geometry, pose, row)
+    total = _fill_one_by_one(geometry, nodes, 0, 1, pose, every)
+    every.arc[0] = 0.0
+    for k in range(1, total):
+        width = every.lateral[k] - every.lateral[k - 1]
+        every.arc[k] = every.arc[k - 1] + 0.5 * width * (1.0 / every.cosine[k] + 1.0 / every.cosine[k - 1])
+    for k in range(1, total - 1):
+        depth = min(every.gap[k], 0.0) * every.cosine[k]
+        every.weight[k] = depth * depth * 0.5 * (every.lateral[k + 1] - every.lateral[k - 1]) / every.cosine[k]
+    every.weight[0] = every.weight[total - 1] = 0.0
+    count = total
+    for k in range(total - 1):
+        if (every.gap[k] < 0.0) != (every.gap[k + 1] < 0.0):
+            _add_end(every, k, count)
+            count += 1
+    describe(every, count, total, geometry.rolling_radius, 0.0, 0.3, out[1])
+    return n, total
+
+
+@pytest.mark.parametrize("y", [-4e-3, -2e-3, 0.0, 1.5e-3])
+def test_strips_of_a_wide_overlap_give_the_descriptors_of_all_its_nodes(y):
+    geometry = load_scene(SCENES / "suspended_wheelset.yaml").alike.geometry
+    handle = Handle(geometry)
+    rows, out = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros((2, N_DESCRIPTORS))
+    row, strips, every, n, total, z = np.zeros(PATCH_COLUMNS), new_strips(), new_strips(), 0, 0, 0.47
+    while not rows[0, PENETRATION] > 6e-5 and z > 0.4:
+        z -= 1e-5
+        n, total = both(handle, y, z, rows, row, strips, every, out)
+    assert 0 < n <= total
+    if total > ENOUGH:
+        assert n <= ENOUGH + 1
+    np.testing.assert_allclose(out[0], out[1], rtol=3e-4, atol=3e-4)
