@@ -11,6 +11,7 @@ import yaml
 
 from study.hard_cases.study import FAMILIES
 from tests.conftest import ROOT
+from wrcore.errors.checked_yaml import _validator
 
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
 
@@ -18,32 +19,33 @@ SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"paper": {"timing": {"repetitions": "five"}}}, "paper.timing.repetitions: 'five' is not of type 'integer'"),
-        ({"paper": {"timing": {"repetition": 5}}}, "'repetition' was unexpected"),
-        ({"creep": {"shown": "absent"}}, "creep.shown: expected a name under tables, got 'absent'"),
         (
-            {"paper": {"timing": {"cases": ["absent"]}}},
-            "paper.timing.cases: expected a name under paper.cases, got 'absent'",
+            {"hard_cases": {"families": {"track": {"curve": {"duration": "9 s"}}}}},
+            "hard_cases.families.track.curve.duration: expected duration of a run (s), got '9 s'",
         ),
-        ({"paper": {"twins": {"rtol": "1e-9"}}}, "paper.twins.rtol: '1e-9' is not of type 'number'"),
+        ({"paper": {"timing": {"repetition": 5}}}, "paper.timing.repetition: unknown key"),
+        ({"paper": {"timing": {"cases": ["absent"]}}}, "paper.timing.cases: expected one of wheelset_v20, "),
+        (
+            {"hard_cases": {"families": {"friction": {"friction_step": {"names": ["free wheelset", "cart"]}}}}},
+            "hard_cases.families.friction.friction_step.names: expected one of suspended wheelset, ",
+        ),
         (
             {"paper": {"cases": {"wheelset_v20": {"scene": "absent.yaml"}}}},
             "paper.cases.wheelset_v20: absent.yaml: expected a readable file",
         ),
         (
-            {"paper": {"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}},
-            "paper.cases.wheelset_v20: changes: sped: unknown key",
+            {"accuracy": {"exact": {"finer": {"contact.resolution": "finest"}}}},
+            "accuracy.exact.finer with accuracy.scenes.suspended_v20: changes: contact.resolution: expected ",
         ),
     ],
 )
 def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):
     (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(change))
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--configfile", str(tmp_path / "wrong.yaml")]
-    command += ["--config", f"pathvars={{results: {tmp_path}/r}}"]
+    command = [sys.executable, "-m", "snakemake", "--dry-run", "--configfile", str(tmp_path / "wrong.yaml")]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert run.returncode != 0
-    assert message in run.stdout + run.stderr
-    assert not (tmp_path / "r").exists()
+    (line,) = [line for line in (run.stdout + run.stderr).splitlines() if "wrong.yaml: " in line]
+    assert line.startswith(f"{tmp_path}/wrong.yaml: {message}")
 
 
 def test_every_key_of_the_study_is_described_and_smoke_adds_none():
@@ -63,6 +65,41 @@ def test_every_key_of_the_study_is_described_and_smoke_adds_none():
     study, smoke = (yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()) for name in ("study", "smoke"))
     del smoke["pathvars"]
     assert set(keys(smoke)) <= set(keys(study))
+
+
+CHANGES = {"set", "track", "tracks", "start", "changes", "variants", "finer", "coarser", "plan", "settings"}
+"""Keys of changes to scenes and wear plans, which are checked as what they change is loaded."""
+
+
+def leaves(data, path=()):
+    """Paths of the single values of nested data."""
+    inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in inner:
+        yield from leaves(value, (*path, key))
+    if not isinstance(data, dict | list):
+        yield path
+
+
+def replaced(data, value):
+    """Nested data with one value in place of all single ones; an empty mapping stays."""
+    if isinstance(data, dict):
+        return {key: replaced(one, value) for key, one in data.items()}
+    return [replaced(one, value) for one in data] if isinstance(data, list) else value
+
+
+@pytest.mark.parametrize("wrong", [None, -1.0e30])
+def test_study_value_of_wrong_type_or_far_below_its_range_is_refused(wrong):
+    study = yaml.safe_load((ROOT / "config/study.yaml").read_text())
+    refused = {tuple(error.absolute_path) for error in _validator()(SCHEMA).iter_errors(replaced(study, wrong))}
+    accepted = [path for path in leaves(study) if not any(path[:n] in refused for n in range(1, len(path) + 1))]
+    free = {"creepages", "shape"} if wrong else set()  # numbers of either sign
+    assert [path for path in accepted if not (CHANGES | free) & set(path)] == []
+
+
+def test_methods_of_the_study_are_those_of_a_scene():
+    scene = yaml.safe_load((ROOT / "wrcore/scene/schemas/scene.yaml").read_text())
+    known = scene["properties"]["integration"]["properties"]["method"]["enum"]
+    assert SCHEMA["$defs"]["method"]["enum"] == known
 
 
 RANGES = {"start", "stop", "num"}

@@ -1,48 +1,60 @@
 # Checks of the configuration, and which sources each family of rules stands on.
+import re
 from pathlib import Path
 
 import yaml
 from snakemake.exceptions import WorkflowError
 
-from wrcore.errors import InputError
-from wrcore.errors.checked_yaml import _validator
+from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_yaml import check, plain_tree
 from wrcore.scene.description import load_scene
 
 HERE = Path(workflow.basedir)
 
 
+def refuse(key, expected):
+    """Stop with one line that names a key of the configuration, and the file that gives it."""
+    places = re.split(" on | with ", key)
+    changed = [
+        path for path in map(Path, workflow.overwrite_configfiles)
+        if any(has_key(yaml.safe_load(path.read_text()) or {}, place.split(".")) for place in places)
+    ]  # fmt: skip
+    file = changed[-1] if changed else HERE / "config/study.yaml"
+    raise WorkflowError(f"{file.relative_to(HERE) if file.is_relative_to(HERE) else file}: {key}: {expected}")
+
+
+def has_key(data, parts):
+    """Whether nested data have a key; names may hold dots."""
+    if not parts:
+        return True
+    if isinstance(data, list):
+        return parts[0].isdigit() and int(parts[0]) < len(data) and has_key(data[int(parts[0])], parts[1:])
+    ways = range(1, len(parts) + 1) if isinstance(data, dict) else ()
+    return any(has_key(data[".".join(parts[:n])], parts[n:]) for n in ways if ".".join(parts[:n]) in data)
+
+
 def check_config():
     """Stop before any job, with one line that names the key, if the configuration cannot be used."""
     schema = yaml.safe_load((HERE / "workflow/schemas/config.schema.yaml").read_text())
-    validator = _validator()(schema)  # imports jsonschema, without a grammar that would take most of a second
-
-    from jsonschema.exceptions import best_match
-
-    error = best_match(validator.iter_errors(config))
-    if error is not None:
-        key = ".".join(map(str, error.absolute_path)) or "top level"
-        meaning = error.schema.get("description", "see workflow/schemas/config.schema.yaml")
-        raise WorkflowError(f"configuration: {key}: {error.message} ({meaning})")
-    chosen = {
-        "paper.timing.cases": config["paper"]["timing"]["cases"],
-        "paper.timing.first": config["paper"]["timing"]["first"],
-        "paper.comparison.case": [config["paper"]["comparison"]["case"]],
-        "paper.figures.contact_points": [config["paper"]["figures"]["contact_points"]],
-    }
-    for key, names in chosen.items():
-        for name in set(names) - set(config["paper"]["cases"]):
-            raise WorkflowError(f"configuration: {key}: expected a name under paper.cases, got {name!r}")
+    try:
+        check(plain_tree(config, "configuration"), schema, "configuration")
+    except InputError as error:
+        refuse(error.field, error.expected)
+    for key, names, place in chosen_names():
+        known = config
+        for part in place.split("."):
+            known = known[part]
+        for name in names:
+            if name not in known:
+                refuse(key, f"{one_of(known, name)} (names under {place})")
     if config["paper"]["comparison"]["case"] not in config["paper"]["timing"]["cases"]:
-        raise WorkflowError("configuration: paper.comparison.case: expected one of paper.timing.cases")
+        refuse("paper.comparison.case", "expected one of paper.timing.cases")
     speeds = config["speeds"]
-    for key in ("released", "disturbed"):
-        if speeds[key] not in speeds["tracks"]:
-            raise WorkflowError(f"configuration: speeds.{key}: expected a name under speeds.tracks, got {speeds[key]!r}")
     if not set(speeds["shown"]) <= set(speeds["values"]):
-        raise WorkflowError("configuration: speeds.shown: expected some of speeds.values")
+        refuse("speeds.shown", "expected some of speeds.values")
     creep = config["creep"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
-        raise WorkflowError(f"configuration: creep.shown: expected a name under tables, got {creep['shown']!r}")
+        refuse("creep.shown", f"expected a name under creep.tables, got {creep['shown']!r}")
     scenes = {f"paper.cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["paper"]["cases"].items()}
     for name, entry in config["accuracy"]["scenes"].items():
         scenes[f"accuracy.scenes.{name}"] = (entry["scene"], entry["set"])
@@ -53,6 +65,19 @@ def check_config():
         scenes[f"cost.scenes.{name}"] = (entry["scene"], entry["set"])
     for name, entry in config["hard_cases"]["vehicles"].items():
         scenes[f"hard_cases.vehicles.{name}"] = (entry["scene"], entry["set"])
+    for case, entry in config["hard_cases"]["families"]["integration"]["long_run"]["changes"].items():
+        place = f"hard_cases.families.integration.long_run.changes.{case}"
+        vehicle = config["hard_cases"]["vehicles"][case]
+        scenes[place] = (vehicle["scene"], vehicle["set"] | entry)
+    hunting = config["hard_cases"]["families"]["streaming"]["hunting"]
+    vehicle = config["hard_cases"]["vehicles"][hunting["name"]]
+    scenes["hard_cases.families.streaming.hunting.changes"] = (vehicle["scene"], vehicle["set"] | hunting["changes"])
+    for model in ("finer", "coarser"):
+        for name, entry in config["accuracy"]["scenes"].items():
+            if "exact" in entry:
+                more = {key: value for key, value in config["accuracy"]["exact"][model].items() if value is not None}
+                scenes[f"accuracy.exact.{model} with accuracy.scenes.{name}"] = (entry["scene"], entry["set"] | more)
+    scenes["patch.cost"] = (config["patch"]["cost"]["scene"], config["patch"]["cost"]["set"])
     scenes["paper.geometry"] = (config["paper"]["geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
@@ -63,12 +88,53 @@ def check_config():
     for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
         for name, model in config["patch"]["runs"]["models"].items():
             place = f"patch.runs.vehicles.{vehicle} with patch.runs.models.{name}"
-            scenes[place] = (config["critical_speed"]["vehicles"][vehicle]["scene"], model["set"] | entry["track"])
+            scene = config["critical_speed"]["vehicles"][vehicle]["scene"]
+            scenes[place] = (scene, model["set"] | entry["track"])
+            if "start" in model:
+                scenes[f"{place}.start"] = (scene, model["set"] | model["start"])
     for key, (scene, changes) in scenes.items():
         try:
             load_scene(scene, changes)
         except InputError as error:
-            raise WorkflowError(f"configuration: {key}: {error}")
+            refuse(key, f"{error}")
+
+
+def chosen_names():
+    """Keys that choose by name: key, the names, and the key under which they stand."""
+    paper, speeds, patch, cost = (config[section] for section in ("paper", "speeds", "patch", "cost"))
+    yield "paper.timing.cases", paper["timing"]["cases"], "paper.cases"
+    yield "paper.timing.first", paper["timing"]["first"], "paper.cases"
+    yield "paper.comparison.case", [paper["comparison"]["case"]], "paper.cases"
+    yield "paper.figures.contact_points", [paper["figures"]["contact_points"]], "paper.cases"
+    for key in ("released", "disturbed"):
+        yield f"speeds.{key}", [speeds[key]], "speeds.tracks"
+    yield "patch.shown.model", [patch["shown"]["model"]], "patch.models"
+    yield "patch.cost.models", patch["cost"]["models"], "patch.models"
+    yield "patch.runs.exact", [patch["runs"]["exact"]], "patch.runs.models"
+    yield "patch.runs.vehicles", patch["runs"]["vehicles"], "critical_speed.vehicles"
+    for name, model in patch["runs"]["models"].items():
+        yield f"patch.runs.models.{name}.variant", {model.get("variant")} - {None}, "critical_speed.variants"
+    for key in ("plain.scene", "creep", "axle_boxes", "detection", "engine"):
+        yield f"cost.pairs.{key}", names_at(cost["pairs"], key), "cost.scenes"
+    for key in ("stages.scenes", "growth.runs.scene", "growth.chains.scene", "growth.simultaneous.scene", "batch.scene", "rejections.scenes"):
+        yield f"cost.{key}", names_at(cost, key), "cost.scenes"
+    for name, train in cost["growth"]["trains"].items():
+        yield f"cost.growth.trains.{name}.scene", [train["scene"]], "cost.scenes"
+    for family, cases in config["hard_cases"]["families"].items():
+        for case, settings in cases.items():
+            for key in {"name", "names", "vehicles", "unstable", "pushes", "changes"} & set(settings) - BY_KEY.get(case, set()):
+                yield f"hard_cases.families.{family}.{case}.{key}", names_at(settings, key), "hard_cases.vehicles"
+
+
+BY_KEY = {"hunting": {"changes"}}
+"""Settings of hard cases that are changes to a scene, not names of vehicles."""
+
+
+def names_at(data, key):
+    """Names at a dotted key: one, a list, or the keys of a mapping."""
+    for part in key.split("."):
+        data = data[part]
+    return [data] if isinstance(data, str) else list(data)
 
 
 check_config()

@@ -6,7 +6,7 @@ for file in config["sweeps"]:
     try:
         SWEEPS[Path(file).stem] = load_sweep(file)
     except InputError as error:
-        raise WorkflowError(f"configuration: sweeps: {error}")
+        refuse("sweeps", f"{error}")
 CORE["sweeps"] = CORE["simulation"] + sources("sweep")
 CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/pictures/plot_run", "study/sweeps")
 

@@ -332,8 +332,11 @@ def _explain(error, schema):
         field = ".".join(filter(None, [field, missing[0]]))
         text = error.schema["properties"].get(missing[0], {}).get("description", "a value")
         return field, f"expected {text}, but the key is missing"
-    description = schema.get("description", "a valid value")
+    root, description = schema, schema.get("description", "a valid value")
     for part in error.absolute_schema_path:  # the innermost description on the way to what failed
+        if part not in schema:  # jsonschema leaves out "$ref"
+            schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
+            description = schema.get("description", description)
         schema = schema[part]
         if isinstance(schema, dict) and isinstance(schema.get("description"), str):
             description = schema["description"]
