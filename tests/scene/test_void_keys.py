@@ -19,7 +19,15 @@ SCENE = SCENES / "suspended_wheelset.yaml"
 TABLE = "pyproject.toml"
 """A file that stands for a creep table, which loading a scene does not read."""
 
+TANGENT = {"track.path": "tangent"}
+CANTED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 600.0, "cant": 0.1}]}
+WIDENED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 200.0, "widening": 0.01}]}
+
 CASES = [
+    ("track.rounding", WIDENED, 3.0, TANGENT),
+    ("track.cant_about", CANTED, "centreline", TANGENT),
+    ("track.rail_climb", CANTED, False, TANGENT),
+    ("track.widened", WIDENED, "left", TANGENT),
     ("vehicle.spacing", {"vehicle.count": 2}, 10.0, {"vehicle.count": 1}),
     ("contact.resolution", {"contact.patch": "exact"}, "coarse", {"contact.patch": "moment"}),
     ("contact.slip", {"contact.patch": "tabulated"}, "creepages", {"contact.patch": "maximum"}),
@@ -111,3 +119,9 @@ def test_run_of_a_sweep_reads_the_table_that_a_single_run_reads():
     sweep = wr.load_sweep(plan)
     made = [_changed(sweep.scene, values).data["contact"]["creep"] for values in sweep.runs.to_dict("records")]
     assert [creep["tolerance"] for creep in made] == [0.05, DEFAULT_TOLERANCE]
+
+
+@pytest.mark.parametrize(("key", "value", "path"), [("widened", "left", CANTED), ("cant_about", "centreline", WIDENED)])
+def test_key_of_cant_or_widening_beside_the_other_is_refused(key, value, path):
+    with pytest.raises(InputError, match=f"track.{key}: expected no such key beside track.path .*, which has no "):
+        wr.load_scene(scene_with(path), {f"track.{key}": value})

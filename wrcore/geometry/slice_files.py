@@ -28,6 +28,7 @@ from wrcore.errors.column_files import header_of, named_columns, read_column_fil
 from wrcore.errors.input_files import check_regular
 from wrcore.geometry.profile_files import read_points
 from wrcore.geometry.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
+from wrcore.kernels.told import warn_once
 
 SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
 PLACES = {"rail": "s_m", "wheel": "angle_rad"}
@@ -173,8 +174,9 @@ def _read_slcs(path, how, kind):
         columns = {**({} if stated else {"unit": unit, "downwards": True}), **how}
         rows.append((number, (value + offset) * unit_of_place, name, columns, places[k] if features else None))
     lost = [f"{int(number)} {what}" for number, what in ((kinks, "kinks"), (steps, "accelerations")) if number]
-    told = f"{' and '.join(lost)} not kept (the surface stays smooth)" if lost else ""
-    return _assembled(path, [("", rows)], kind, told, method == 1)
+    if lost:
+        warn_once(f"{path}: {' and '.join(lost)} not kept: the surface stays smooth along the {kind}")
+    return _assembled(path, [("", rows)], kind, method == 1)
 
 
 def _listed(lines):
@@ -245,7 +247,7 @@ def _names(file, kind):
     return [found[k][0] if k in found else name for k, name in enumerate(file.names)]
 
 
-def _assembled(path, heads, kind, told="", through=True):
+def _assembled(path, heads, kind, through=True):
     """`RailSlices` or `WheelSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature
     lines)); ``through`` as for `sheets_of`."""
     stations, known = np.unique([row[1] for _, rows in heads for row in rows]), {}
@@ -270,7 +272,7 @@ def _assembled(path, heads, kind, told="", through=True):
         raise InputError(path, "features", "expected a part of the rail between two feature lines, got none")
     profiles = len({row[2] for _, rows in heads for row in rows})
     source = f"{stations.size} slices from s = {stations[0]:g} to {stations[-1]:g} m, {profiles} profiles, "
-    source += f"{len(sheets)} parts" + f", {told}" * bool(told)
+    source += f"{len(sheets)} parts"
     _, _, name, how, _ = heads[0][1][0]
     first = {"points": str(path.parent / name), **how}
     rail = RailSlices(str(path), stations, tuple(sheets), source, alike, first)

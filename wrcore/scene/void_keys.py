@@ -40,7 +40,24 @@ _LAW = "contact.creep.model", lambda model: model != "table", "which has no tabl
 _TABLE = "contact.creep.table", lambda table: table is not None, "which has its own planes and tolerance"
 _POLACH = "contact.creep.model", lambda model: model != "polach", "unlike polach"
 
+
+def _lacks(*keys):
+    """Whether no segment of a track's path has any of some keys."""
+    return lambda path: (
+        not any(
+            isinstance(one, dict) and any(one.get(key) for key in keys)
+            for one in (path if isinstance(path, list) else [])
+        )
+    )
+
+
 VOID_KEYS: tuple[VoidKey, ...] = (
+    VoidKey("track.rounding", "track.path", _lacks("cant", "widening"), "which has no cant and no widening"),
+    *(
+        VoidKey(f"track.{key}", "track.path", _lacks("cant"), "which has no cant")
+        for key in ("cant_about", "rail_climb")
+    ),
+    VoidKey("track.widened", "track.path", _lacks("widening"), "which has no widening"),
     VoidKey("vehicle.spacing", "vehicle.count", lambda count: count == 1, "as spacing is between vehicles"),
     VoidKey("contact.resolution", *_STRIPS),
     VoidKey("contact.slip", *_STRIPS),
@@ -99,4 +116,6 @@ def _at(data, key):
 @cache
 def _defaults():
     """Defaults of the scene's keys by their paths."""
-    return {key: default for key, _, _, default, _ in keys_of("scene")} | {"contact.creep.tolerance": DEFAULT_TOLERANCE}
+    tables = (("", "scene"), ("track.", "track"))
+    found = {above + key: default for above, name in tables for key, _, _, default, _ in keys_of(name)}
+    return found | {"contact.creep.tolerance": DEFAULT_TOLERANCE}

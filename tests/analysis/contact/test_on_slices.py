@@ -192,12 +192,20 @@ def write_slcs(folder, **change):
 
 
 @pytest.mark.parametrize(
-    ("lost", "said"), [("1 0", "1 kinks"), ("0 2", "2 accelerations"), ("1 2", "1 kinks and 2 acc")]
+    ("lost", "said"), [("1 0", "1 kinks"), ("0 2", "2 accelerations"), ("1 2", "1 kinks and 2 accelerations")]
 )
-def test_slices_name_kinks_and_accelerations_that_are_not_kept(tmp_path, lost, said):
-    write_slcs(tmp_path, lost=lost, places="5.0\n" * np.count_nonzero([int(n) for n in lost.split()]))
-    source = read_slices(tmp_path / "rail.slcs").source
-    assert said in source and "not kept" in source
+@pytest.mark.parametrize(("kind", "name"), [("rail", "rail.slcs"), ("wheel", "wheel.slcw")])
+def test_slices_name_kinks_and_accelerations_that_are_not_kept(tmp_path, capsys, kind, name, lost, said):
+    write_slcs(tmp_path, lost=lost, places="5.0\n" * np.count_nonzero([int(n) for n in lost.split()]), second="1.0")
+    (tmp_path / "rail.slcs").rename(tmp_path / name)
+    read_slices(tmp_path / name, kind)
+    assert f"{name}: {said} not kept: the surface stays smooth along the {kind}" in capsys.readouterr().err
+
+
+def test_slices_without_kinks_are_read_without_a_word(tmp_path, capsys):
+    write_slcs(tmp_path)
+    read_slices(tmp_path / "rail.slcs")
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(
