@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import wrcore as wr
@@ -98,3 +99,26 @@ def test_run_over_a_flat_counts_and_names_the_wheel(capsys):
     times = found["flat"][f"{NAME}_wheelset_left"]
     assert 1 <= times <= 4 and found["flat"][NAME] == times and f"{NAME}_wheelset_right" not in found["flat"]
     assert found["polygon"][NAME] == 0 and ROUGH == 0.05
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        "maximum",
+        "surrogate",
+        pytest.param("exact", marks=pytest.mark.check),
+        pytest.param("tabulated", marks=pytest.mark.check),
+    ],
+)
+def test_run_over_a_short_bump_is_flagged_with_each_patch_model(tmp_path, patch):
+    """A bump of 50 um, 4 mm wide at half its height: the patch lies on it for a few outputs of 0.1 ms."""
+    angles = np.arange(0.0, 2.0 * math.pi, 1e-3)
+    bump = 5e-5 * np.exp(-0.5 * ((angles - 4.0) * RADIUS / 1.7e-3) ** 2)
+    table = pd.DataFrame({"angle_rad": angles, "deviation_m": bump})
+    table.to_csv(tmp_path / "bump.csv", index=False)
+    changes = {
+        "wheel.left.out_of_round": {"table": str(tmp_path / "bump.csv"), "angle": 0.0}, "contact.patch": patch,
+        "speed": 20.0, "integration.duration": 0.095, "output.rate": 1e4,
+    }  # fmt: skip
+    run = wr.simulate(wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes), progress=False)
+    assert run.status == "completed" and run.counters[f"{NAME}_wheelset_left"] > 3
