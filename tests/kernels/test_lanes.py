@@ -7,16 +7,21 @@ from wrcore.kernels.jit import FUSED, jit
 from wrcore.kernels.lanes import (
     below,
     count_bits,
+    every8,
     greatest,
     highest_bit,
     lane,
     lanes8,
     load4,
     load8,
+    load32,
     lowest_bit,
     put8,
+    put32,
     ramp8,
+    root,
     take8,
+    take32,
     total,
     where_below,
 )
@@ -89,3 +94,34 @@ def test_single_precision_is_widened_and_lanes_are_written(kinds):
 def test_single_precision_is_widened():
     values = np.arange(20, dtype=np.float32) / 3
     assert four(values, 5) == (values[5:9].astype(float).sum(), float(values[8]))
+
+
+@jit(fastmath=FUSED)
+def of_every_third(rows, out):
+    """Roots of eight columns of row 1, three apart from the second on, over 1 + their number."""
+    put8(out, np.uint64(0), root(every8(rows, np.uint64(1), np.uint64(2), np.uint64(3))) / (1.0 + ramp8()))
+
+
+def test_columns_apart_and_roots():
+    rows, out = np.random.default_rng(3).random((2, 40)), np.zeros(8)
+    of_every_third(rows, out)
+    np.testing.assert_allclose(out, np.sqrt(rows[1, 2:26:3]) / np.arange(1.0, 9.0), rtol=1e-15)
+
+
+@jit(fastmath=FUSED)
+def of_32(rows, factor, out):
+    """Sum of 32 products of row 1 and of row 0 less a factor, and roots of their squares and a quarter."""
+    start = np.uint64(5)
+    products = load32(rows, np.uint64(1), start) * (take32(rows[0], start) - factor)
+    put32(out, start, root(products * products + 0.25))
+    return total(products)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_32_numbers(kind):
+    random, out = np.random.default_rng(4), np.zeros(60)
+    rows = random.normal(size=(2, 60)).astype(kind)
+    products = rows[1, 5:37].astype(float) * (rows[0, 5:37].astype(float) - 0.3)
+    assert of_32(rows, 0.3, out) == pytest.approx(products.sum(), abs=1e-13)
+    np.testing.assert_allclose(out[5:37], np.sqrt(products**2 + 0.25), rtol=1e-14)
+    assert not out[:5].any() and not out[37:].any()

@@ -11,18 +11,21 @@ Wheels with patches that press each other are left to differences of the whole w
 from wrcore.contact import reduction
 from wrcore.contact.moved import MOVES
 from wrcore.contact.patch.gap import group_end
+from wrcore.contact.surrogate.network import run_network
 from wrcore.dynamics.contact_blocks import UNCOUNTED, direction_of, move_along
 from wrcore.dynamics.contact_slopes import SAME, SLOPES
-from wrcore.dynamics.lift import Lift
+from wrcore.dynamics.lift import Lift, lift_of
 from wrcore.dynamics.motion import motion_of
 from wrcore.dynamics.surrogate_wheel import (
+    NOTHING_PRESSED,
     Pressed,
     add_patch,
+    describe_patch,
     find_patches,
     lean_of_group,
     left_ahead,
-    lift_of_group,
-    press_patch,
+    press_group,
+    pressed_of,
     roll_patch,
 )
 from wrcore.dynamics.vector import copy_into
@@ -81,8 +84,9 @@ def _wheel_slopes(contact, base, moved, found, slopes, wrenches, work):
         last = group_end(contact.geometry, found[0], count, first)
         if find_patches(contact.geometry, m, is_spatial, found[0], first, last, work.surrogate.forces) > 1:
             return -1
-        if _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
-            _add_slopes(contact, base, moved, is_spatial, found[0], first, last, slopes, wrenches, work)
+        pressed = _find_numbers(contact, base, moved, is_spatial, found, first, last, work)
+        if pressed.square > 0.0:
+            _add_slopes(contact, base, moved, pressed, found[0], first, last, slopes, wrenches, work)
         first = last
     for i in range(6):
         sign = -1.0 if seen.side < 0.0 and i % 2 == 1 else 1.0
@@ -95,31 +99,40 @@ def _wheel_slopes(contact, base, moved, found, slopes, wrenches, work):
 @jit(allocates=False, fastmath=FUSED)
 def _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
     """Fill ``work.surrogate.numbers`` (in each row `_FIELDS`, then outputs of the network) of the only patch of a group
-    of overlaps; False where the wheel hangs in the air."""
-    surrogate, lean, row = work.surrogate, (1.0, 0.0), work.rows[0]
+    of overlaps, and return what it has pressed (`wrcore.contact.approach.Pressed`); nothing if the wheel hangs in the
+    air."""
+    surrogate, geometry, lean, row = work.surrogate, contact.geometry, (1.0, 0.0), work.rows[0]
+    unmoved = NOTHING_PRESSED
     for n in range(2 + MOVES):
         difference = DIFFERENCE if 0 < n < _LIFTED else 0.0
         move_along(base, direction_of(max(n - 1, 0) % MOVES), difference, moved)
         m, rows = left_ahead(motion_of(moved)), found[n if n < _LIFTED else 0]
         if n == 0:
-            lean = lean_of_group(contact.geometry, m, rows, first, last, row)
-        moving = leaning_motion(contact.geometry, m, lean)
-        lift = lift_of_group(contact, m, moving, is_spatial, lean, rows, first, last, work.moments)
+            lean = lean_of_group(geometry, m, rows, first, last, row)
+        pressed, filled = press_group(geometry, m, is_spatial, lean, rows, 1, row, surrogate)
+        if not pressed.square > 0.0:
+            return NOTHING_PRESSED
+        lift = lift_of(contact, leaning_motion(geometry, m, lean), pressed)
         if n == _LIFTED:
             lift = Lift(lift.share + DIFFERENCE / lift.depth, lift.depth, lift.cosine, lift.sine)
-        p = press_patch(contact, m, is_spatial, lean, lift, rows, 0, row, surrogate)
-        if not p.load > 0.0:
-            return False
-        numbers = surrogate.numbers[n]
+        if not lift.share < 1.0:
+            return NOTHING_PRESSED
+        patch = describe_patch(contact, m, is_spatial, lift, rows, 0, filled, row, surrogate)
+        numbers, outputs = surrogate.numbers[n], surrogate.numbers[n, _FIELDS:]
+        if not patch.shape.square > 0.0:
+            return NOTHING_PRESSED
+        unmoved, trust = pressed if n == 0 else unmoved, run_network(contact.surrogate, surrogate.network)
+        copy_into(outputs, surrogate.network.outputs)
+        p = pressed_of(contact, patch, lean, 0.0, trust, outputs)
         for i in range(_FIELDS):
             numbers[i] = p[i]
-        copy_into(numbers[_FIELDS:], surrogate.network.outputs)
-    return True
+    return unmoved
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_slopes(contact, base, moved, is_spatial, rows, first, last, slopes, wrenches, work):
-    """Add the slopes of the patch that `_find_numbers` found; arguments as there and in `_wheel_slopes`."""
+def _add_slopes(contact, base, moved, pressed, rows, first, last, slopes, wrenches, work):
+    """Add the slopes of the patch that `_find_numbers` found and for which it returned ``pressed``; other arguments as
+    there and in `_wheel_slopes`."""
     geometry, numbers, lean = contact.geometry, work.surrogate.numbers, (1.0, 0.0)
     now, lifted, mixed = numbers[0], numbers[_LIFTED], numbers[_LIFTED + 1]
     speed, share = max(abs(motion_of(base).vx), contact.least_speed), 0.0
@@ -133,7 +146,7 @@ def _add_slopes(contact, base, moved, is_spatial, rows, first, last, slopes, wre
         if 0 <= j < MOVES:
             here = numbers[1 + j]
         else:
-            lift = lift_of_group(contact, m, moving, is_spatial, lean, rows, first, last, work.moments)
+            lift = lift_of(contact, moving, pressed)
             share = lift.share if j < 0 else share
             part = (lift.share - share) * lift.depth / DIFFERENCE
             for i in range(len(mixed)):

@@ -15,16 +15,16 @@ patch, the creep force by friction, its power by zero.
 import math
 from typing import NamedTuple
 
-from wrcore.contact import reduction
-from wrcore.contact.approach import pressed_together
+from wrcore.contact import approach, reduction
+from wrcore.contact.approach import add_pressed
 from wrcore.contact.creepage import creepages
 from wrcore.contact.half_space_coupling import ellipse_of, rise_by_pressure, slip_by_friction, write_ellipse
 from wrcore.contact.normal import contact_modulus, hertz_shape_at
 from wrcore.contact.patch.gap import add_force, group_end
 from wrcore.contact.strip import lean_at, leaning, make_pose, upright
-from wrcore.contact.surrogate.descriptors import describe, parabola_at
+from wrcore.contact.surrogate.descriptors import PatchShape, describe, parabola_at
 from wrcore.contact.surrogate.network import force_remainder, run_network
-from wrcore.contact.surrogate.strips import fill_strips
+from wrcore.contact.surrogate.strips import close_strips, fill_strips, lift_strips, press_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.lift import lift_of
 from wrcore.dynamics.modes import FRESH, PATCHES_ONLY
@@ -83,6 +83,8 @@ class Pressed(NamedTuple):
     """Share of the network's outputs that counts, 1 in the range of its training and near it."""
 
 
+NOTHING_PRESSED = approach.Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 _NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -132,28 +134,77 @@ def _lifted_wheel(m, lift, rise, tilt, ellipse):
     return m.y - height * lift.sine + ty, m.z + height * lift.cosine + tz, m.ez + tilt, ty, tz
 
 
+class LiftedPatch(NamedTuple):
+    """A patch of a wheel that damping and other patches lift: its form, the rail coordinate of the wheelset's centre
+    less its place across the track (m), and what the tilt by other patches adds to the place across and up (m)."""
+
+    shape: PatchShape
+    aside: float
+    ty: float
+    tz: float
+
+
 @jit(allocates=False, fastmath=FUSED)
-def press_patch(model, m, is_spatial, lean, lift, rows, q, row, work):
-    """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel; ``row``
-    (PATCH_COLUMNS,) becomes its deepest overlap. ``work.network.outputs`` become those of the patch."""
-    geometry, network, forces = model.geometry, work.network, work.forces
-    first, last, tilt = forces.first[q], forces.last[q], forces.tilt[q]
+def _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work):
+    """Fill ``work.strips`` of the patch ``q`` of ``work.forces`` where the wheelset's centre stands at ``y`` and ``z``
+    and its axle has the component ``ez``; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap. Returns the pose, the
+    number of strips and their spacing (m)."""
+    first, last = work.forces.first[q], work.forces.last[q]
     copy_deepest(rows, first, last, row)
-    if lift.share >= 1.0:
-        return _NO_CONTACT
-    y, z, ez, ty, tz = _lifted_wheel(m, lift, forces.rise[q], tilt, forces.ellipses[q])
     pose = make_pose(1.0, y, z, m.ex, m.ey, ez, is_spatial)
     low, high = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
-    count, n = fill_strips(geometry, pose, row, low, high, work.strips)
+    n, step = fill_strips(geometry, pose, row, low, high, work.strips)
+    return pose, n, step
+
+
+@jit(allocates=False, fastmath=FUSED)
+def press_group(geometry, m, is_spatial, lean, rows, count, row, work):
+    """`wrcore.contact.approach.Pressed` of the ``count`` patches of a group, and the number of strips of the last one,
+    which ``work.strips`` then holds; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap."""
+    total, n = NOTHING_PRESSED, 0
+    for q in range(count):
+        pose, n, step = _fill_patch(geometry, m, is_spatial, m.y, m.z, m.ez, rows, q, row, work)
+        if n > 0:
+            total = add_pressed(total, press_strips(geometry, pose, lean, work.strips, n, step))
+    return total, n
+
+
+@jit(allocates=False, fastmath=FUSED)
+def describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work):
+    """`LiftedPatch` of the patch ``q`` of ``work.forces``. ``filled``: number of strips that `press_group` has left of
+    an only patch, else 0. ``row`` (PATCH_COLUMNS,) becomes its deepest overlap, and ``work.network.descriptors`` those
+    of the patch."""
+    geometry, forces, n = model.geometry, work.forces, filled
+    y, z, ez, ty, tz = _lifted_wheel(m, lift, forces.rise[q], forces.tilt[q], forces.ellipses[q])
+    if filled > 0:
+        lift_strips(work.strips, filled, y - m.y, z - m.z)
+    else:
+        _, n, _ = _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work)
+    count = close_strips(work.strips, n) if n > 0 else 0
     friction = max(m.friction, _LEAST_FRICTION)
-    shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, network.descriptors)
-    if not shape.square > 0.0:
+    shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, work.network.descriptors)
+    return LiftedPatch(shape, geometry.rail_distance - y + ty, ty, tz)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def press_patch(model, m, is_spatial, lean, lift, rows, q, filled, row, work):
+    """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel;
+    ``filled`` and ``row`` as for `describe_patch`. ``work.network.outputs`` become those of the patch."""
+    if not lift.share < 1.0:
         return _NO_CONTACT
-    p = _pressed(model, shape, run_network(model.surrogate, network), model.surrogate.corrections, network.outputs)
-    px, pz = leaning(geometry, lean, p.px, p.pz + tz)
-    return Pressed(
-        p.load, p.log_a, p.log_b, p.p_max, px, p.py + geometry.rail_distance - y + ty, pz, p.angle - 0.5 * tilt, p.trust
-    )
+    patch = describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work)
+    if not patch.shape.square > 0.0:
+        return _NO_CONTACT
+    trust = run_network(model.surrogate, work.network)
+    return pressed_of(model, patch, lean, work.forces.tilt[q], trust, work.network.outputs)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def pressed_of(model, patch, lean, tilt, trust, outputs):
+    """`Pressed` of a `LiftedPatch` for these ``outputs`` of the network, in axes that ``lean``."""
+    p = _pressed(model, patch.shape, trust, model.surrogate.corrections, outputs)
+    px, pz = leaning(model.geometry, lean, p.px, p.pz + patch.tz)
+    return Pressed(p.load, p.log_a, p.log_b, p.p_max, px, p.py + patch.aside, pz, p.angle - 0.5 * tilt, p.trust)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -295,28 +346,23 @@ def lean_of_group(geometry, m, rows, first, last, deepest):
     return lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def lift_of_group(model, m, moving, is_spatial, lean, rows, first, last, moments):
-    """`Lift` of a wheel by the damping of a group of overlaps; ``moving``: the motion in axes that ``lean``."""
-    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial)
-    pressed = pressed_together(model.geometry, pose, is_spatial, lean, rows, first, last, moments)
-    return lift_of(model, moving, pressed)
-
-
 @jit(allocates=False, fastmath=FUSED)
-def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, moments, scratch_rows, work):
+def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, scratch_rows, work):
     """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
-    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten. ``moments``
-    (3, 5) and ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) are scratch."""
+    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten.
+    ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) is scratch."""
     geometry, forces = model.geometry, work.forces
     lean = lean_of_group(geometry, m, rows, first, last, scratch_rows[0])
     moving = leaning_motion(geometry, m, lean)
-    lift = lift_of_group(model, m, moving, is_spatial, lean, rows, first, last, moments)
     count = find_patches(geometry, m, is_spatial, rows, first, last, forces)
-    rounds = 1 if count == 1 else _ROUNDS
+    pressed, filled = press_group(geometry, m, is_spatial, lean, rows, count, scratch_rows[0], work)
+    if not pressed.square > 0.0:
+        return kept
+    lift, rounds = lift_of(model, moving, pressed), 1 if count == 1 else _ROUNDS
+    filled = filled if count == 1 else 0
     for turn in range(rounds):
         for q in range(count):
-            p = press_patch(model, m, is_spatial, lean, lift, rows, q, scratch_rows[q], work)
+            p = press_patch(model, m, is_spatial, lean, lift, rows, q, filled, scratch_rows[q], work)
             forces.load[q] = p.load
             if not p.load > 0.0:
                 continue
@@ -363,8 +409,8 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
                 while first < count:
                     last = group_end(contact.geometry, rows, count, first)
                     kept = group_forces(
-                        contact, m, is_spatial, rows, first, last, kept, wrench, counters,
-                        scratch.moments, scratch.rows, scratch.surrogate,
+                        contact, m, is_spatial, rows, first, last, kept, wrench, counters, scratch.rows,
+                        scratch.surrogate,
                     )  # fmt: skip
                     first = last
                 count = kept

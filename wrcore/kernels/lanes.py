@@ -1,7 +1,8 @@
-"""Vector registers in kernels: four or eight float64 side by side, for loops that the compiler does not vectorise well.
+"""Vector registers in kernels: four, eight or 32 float64 side by side, for loops that the compiler does not vectorise
+well.
 
-A kernel writes ``x = load8(a, row, i)`` and calculates with + - * as with numbers; a number beside lanes counts for all
-of them. Products and sums are fused (`FUSED` of `wrcore.kernels.jit`). Processors without such wide registers take
+A kernel writes ``x = load8(a, row, i)`` and calculates with + - * / as with numbers; a number beside lanes counts for
+all of them. Products and sums are fused (`FUSED` of `wrcore.kernels.jit`). Processors without such wide registers take
 several. No bounds are checked.
 """
 
@@ -36,7 +37,7 @@ class _LanesModel(models.PrimitiveModel):
         super().__init__(manager, lanes, lanes.vector)
 
 
-FOUR, EIGHT = Lanes(4), Lanes(8)
+FOUR, EIGHT, THIRTY_TWO = Lanes(4), Lanes(8), Lanes(32)
 
 
 def _spread(builder, number, lanes):
@@ -53,7 +54,7 @@ def _call(builder, name, result, arguments, **options):
 
 def _define(function, instruction):
     """Let an operator work on lanes and on lanes with a number."""
-    pairs = [(a, b) for lanes in (FOUR, EIGHT)
+    pairs = [(a, b) for lanes in (FOUR, EIGHT, THIRTY_TWO)
              for a, b in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes))]  # fmt: skip
 
     @infer_global(function)
@@ -70,7 +71,9 @@ def _define(function, instruction):
     return Typing
 
 
-for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+for _function, _instruction in (
+    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")
+):  # fmt: skip
     _define(_function, _instruction)
 
 
@@ -84,52 +87,98 @@ def _load(builder, array, kind, offset, lanes):
     return builder.fpext(found, lanes.vector) if single else found
 
 
-@intrinsic
-def load8(_, rows, row, start):
-    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
+def _of_row(lanes):
+    """Code generator of lanes from a row of a matrix."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
         length = cgutils.unpack_tuple(builder, array.shape, 2)[1]
         offset = builder.add(builder.mul(arguments[1], length), arguments[2])
-        return _load(builder, array, call.args[0], offset, EIGHT)
+        return _load(builder, array, call.args[0], offset, lanes)
 
-    return EIGHT(rows, row, start), generate
+    return generate
+
+
+def _of_array(lanes):
+    """Code generator of lanes from an array."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        return _load(builder, array, call.args[0], arguments[1], lanes)
+
+    return generate
+
+
+def _into_array(lanes):
+    """Code generator that writes lanes into an array."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        place = builder.bitcast(builder.gep(array.data, [arguments[1]]), lanes.vector.as_pointer())
+        builder.store(arguments[2], place, align=8)
+        return context.get_dummy_value()
+
+    return generate
+
+
+@intrinsic
+def load8(_, rows, row, start):
+    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
+    return EIGHT(rows, row, start), _of_row(EIGHT)
+
+
+@intrinsic
+def load32(_, rows, row, start):
+    """``rows[row, start : start + 32]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
+    return THIRTY_TWO(rows, row, start), _of_row(THIRTY_TWO)
+
+
+@intrinsic
+def every8(_, rows, row, start, stride):
+    """``rows[row, start : start + 8 * stride : stride]`` of a contiguous (m, n) array of float64; all unsigned."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        length = cgutils.unpack_tuple(builder, array.shape, 2)[1]
+        offset = builder.add(builder.mul(arguments[1], length), arguments[2])
+        lanes = ir.Constant(EIGHT.vector, ir.Undefined)
+        for k in range(8):
+            number = builder.load(builder.gep(array.data, [offset]))
+            lanes = builder.insert_element(lanes, number, _INDEX(k))
+            offset = builder.add(offset, arguments[3])
+        return lanes
+
+    return EIGHT(rows, types.uint64, types.uint64, types.uint64), generate
+
+
+@intrinsic
+def load4(_, values, start):
+    """``values[start : start + 4]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    return FOUR(values, start), _of_array(FOUR)
 
 
 @intrinsic
 def take8(_, values, start):
     """``values[start : start + 8]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    return EIGHT(values, start), _of_array(EIGHT)
 
-    def generate(context, builder, call, arguments):
-        array = context.make_array(call.args[0])(context, builder, arguments[0])
-        return _load(builder, array, call.args[0], arguments[1], EIGHT)
 
-    return EIGHT(values, start), generate
+@intrinsic
+def take32(_, values, start):
+    """``values[start : start + 32]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    return THIRTY_TWO(values, start), _of_array(THIRTY_TWO)
 
 
 @intrinsic
 def put8(_, values, start, lanes):
     """Write lanes to ``values[start : start + 8]`` of a contiguous array of float64; ``start`` unsigned."""
-
-    def generate(context, builder, call, arguments):
-        array = context.make_array(call.args[0])(context, builder, arguments[0])
-        place = builder.bitcast(builder.gep(array.data, [arguments[1]]), EIGHT.vector.as_pointer())
-        builder.store(arguments[2], place, align=8)
-        return context.get_dummy_value()
-
-    return types.void(values, start, EIGHT), generate
+    return types.void(values, start, EIGHT), _into_array(EIGHT)
 
 
 @intrinsic
-def load4(_, values, start):
-    """``values[start : start + 4]`` of a contiguous array of float32; ``start`` unsigned."""
-
-    def generate(context, builder, call, arguments):
-        array = context.make_array(call.args[0])(context, builder, arguments[0])
-        return _load(builder, array, call.args[0], arguments[1], FOUR)
-
-    return FOUR(values, start), generate
+def put32(_, values, start, lanes):
+    """Write lanes to ``values[start : start + 32]`` of a contiguous array of float64; ``start`` unsigned."""
+    return types.void(values, start, THIRTY_TWO), _into_array(THIRTY_TWO)
 
 
 @intrinsic
@@ -171,6 +220,16 @@ def total(_, lanes):
         return _call(builder, name, _DOUBLE, [_DOUBLE(0.0), arguments[0]], fastmath=_SUM)
 
     return types.float64(lanes), generate
+
+
+@intrinsic
+def root(_, lanes):
+    """Square roots."""
+
+    def generate(_, builder, __, arguments):
+        return _call(builder, f"llvm.sqrt.v{lanes.count}f64", lanes.vector, arguments)
+
+    return lanes(lanes), generate
 
 
 @intrinsic

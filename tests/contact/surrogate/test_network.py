@@ -22,19 +22,27 @@ def outputs_at(surrogate, descriptors):
     return trust, work.outputs.copy()
 
 
-def test_outputs_are_those_of_the_layers_in_numpy(surrogate):
-    random = np.random.default_rng(1)
-    descriptors = surrogate.median + 0.3 / surrogate.per_scale * random.normal(size=N_DESCRIPTORS)
-    descriptors = np.clip(descriptors, surrogate.least, surrogate.greatest)
+def in_numpy(surrogate, descriptors):
+    """Outputs of the layers in double precision."""
     x, layers = (descriptors - surrogate.median) * surrogate.per_scale, surrogate.layers
     x = x / (1.0 + x * x) ** 0.25
     for k in (1, 2, 3):
-        x = x @ getattr(layers, f"weights_{k}") + getattr(layers, f"biases_{k}")
+        x = x @ getattr(layers, f"weights_{k}").astype(float) + getattr(layers, f"biases_{k}")
         x = 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0))
-    expected = x @ layers.weights_4 + layers.biases_4
+    return x @ layers.weights_4.astype(float) + layers.biases_4
+
+
+def in_range(surrogate, seed):
+    random = np.random.default_rng(seed)
+    descriptors = surrogate.median + 0.3 / surrogate.per_scale * random.normal(size=N_DESCRIPTORS)
+    return np.clip(descriptors, surrogate.least, surrogate.greatest)
+
+
+def test_outputs_are_those_of_the_layers_in_numpy(surrogate):
+    descriptors = in_range(surrogate, 1)
     trust, found = outputs_at(surrogate, descriptors)
     assert trust == 1.0
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found, in_numpy(surrogate, descriptors), rtol=1e-12, atol=1e-12)
 
 
 def test_splines_are_the_force_modes(surrogate):
@@ -43,7 +51,8 @@ def test_splines_are_the_force_modes(surrogate):
     random = np.random.default_rng(2)
     r, angle = 0.95 * np.sqrt(random.random(200)), random.uniform(0.0, 2.0 * math.pi, 200)
     p, q = r * np.cos(angle), r * np.sin(angle)
-    modes, outputs = network.force_modes(z, p, q), 0.3 * random.normal(size=len(surrogate.layers.biases_4))
+    modes = network.force_modes(z, p, q)
+    outputs = 0.3 * random.normal(size=network.N_CORRECTIONS + modes.shape[2])
     found = np.array([network.force_remainder(surrogate, outputs, *place) for place in zip(p, q, strict=True)])
     expected = modes @ outputs[network.N_CORRECTIONS :]
     assert np.abs(expected).max() > 5e-3  # of friction times load

@@ -11,7 +11,7 @@ from wrcore.contact.moved import smooth_nodes
 from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
 from wrcore.contact.strip import make_pose
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, describe
-from wrcore.contact.surrogate.strips import ENOUGH, _add_end, _fill_one_by_one, fill_strips, new_strips
+from wrcore.contact.surrogate.strips import ENOUGH, _add_end, _fill_one_by_one, close_strips, fill_strips, new_strips
 from wrcore.dynamics.vector import copy_into
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
@@ -29,10 +29,11 @@ def both(geometry, y, z, rows, row, strips, every, out):
     if find_patches(geometry, 1.0, y, z, -YAW, along, 0.0, True, MOMENT, rows) != 1:
         return 0, 0
     copy_into(row, rows[0])
-    count, n = fill_strips(geometry, pose, row, rows[0, OUTSIDE], rows[0, BEYOND], strips)
+    n, _ = fill_strips(geometry, pose, row, rows[0, OUTSIDE], rows[0, BEYOND], strips)
+    count = close_strips(strips, n)
     describe(strips, count, n, geometry.rolling_radius, 0.0, 0.3, out[0])
     nodes, _, _ = smooth_nodes(geometry, pose, row)
-    total = _fill_one_by_one(geometry, nodes, 0, 1, pose, every)
+    total = _fill_one_by_one(geometry, nodes, 0, 1, pose, (-1.0, 1.0), every)
     every.arc[0] = 0.0
     for k in range(1, total):
         width = every.lateral[k] - every.lateral[k - 1]

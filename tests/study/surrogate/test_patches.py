@@ -12,7 +12,7 @@ from study.surrogate.solution import POINTS, ExactPatches, random_points, unboun
 from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact import reduction
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.contact.surrogate.network import FORCE_CELLS, N_CORRECTIONS, Layers, Surrogate
+from wrcore.contact.surrogate.network import FORCE_CELLS, N_CORRECTIONS, WIDTH, Layers, Surrogate
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.surrogate_wheel import bounded, surrogate_wrenches
@@ -148,11 +148,14 @@ def test_unbounded_is_the_inverse_of_bounded():
 
 def constant_surrogate(corrections, remainder):
     """`Surrogate` whose outputs are the same for every overlap, with one force mode for each of Fx, Fy and Mz."""
-    biases = np.concatenate([corrections, remainder])
-    sizes = 38, 8, 8, 8, len(biases)
-    shapes = [shape for a, b in zip(sizes[:-1], sizes[1:], strict=True) for shape in ((a, b), (b,))]
-    layers = Layers(*(np.zeros(shape) for shape in shapes))
-    modes = np.zeros((FORCE_CELLS + 2, FORCE_CELLS + 2, 3, 3), np.float32)
+    biases = np.zeros(WIDTH)
+    biases[: N_CORRECTIONS + 3] = *corrections, *remainder
+    sizes = 38, *[WIDTH] * 4
+    layers = []
+    for inputs, outputs in zip(sizes[:-1], sizes[1:], strict=True):
+        layers += [np.zeros((inputs, outputs), np.float32), np.zeros(outputs)]
+    layers = Layers(*layers)
+    modes = np.zeros((FORCE_CELLS + 2, FORCE_CELLS + 2, 3, 8))
     modes[:, :, range(3), range(3)] = 1.0
     ones = np.ones(38)
     return Surrogate(0 * ones, ones, -ones, ones, 0 * ones, layers._replace(biases_4=biases), np.ones(N_CORRECTIONS),

@@ -9,7 +9,7 @@ from wrcore.contact.patch.gap import group_end
 from wrcore.contact.reduction import BEYOND, MOMENT, OUTSIDE
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.contact.surrogate.descriptors import describe
-from wrcore.contact.surrogate.strips import fill_strips
+from wrcore.contact.surrogate.strips import close_strips, fill_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.pair_table import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
 from wrcore.dynamics.strip_wheel import copy_deepest
@@ -55,7 +55,8 @@ def find_described(model, position, rows, row, sums, strips, corrections, zeros,
             place = log_depth_of(pressed_together(geometry, pose, True, LEVEL, rows, first, last, sums))[1]
             copy_deepest(rows, first, last, row)
             low, high = rows[first, OUTSIDE], rows[last - 1, BEYOND]
-            total, nodes = fill_strips(geometry, pose, row, low, high, strips)
+            nodes, _ = fill_strips(geometry, pose, row, low, high, strips)
+            total = close_strips(strips, nodes) if nodes > 0 else 0
             shape = describe(strips, total, nodes, geometry.rolling_radius, ez, model.friction, descriptors[n])
             if shape.square > 0.0:
                 p = _pressed(model, shape, 1.0, corrections, zeros)

@@ -49,5 +49,6 @@ def surrogate_scratch(surrogate):
     ends, values = (np.zeros(MAX_PATCHES, np.int64) for _ in range(2)), (np.zeros(MAX_PATCHES) for _ in range(8))
     strips = new_strips() if used else Strips(*(np.zeros(0) for _ in Strips._fields))
     forces = PatchForces(*ends, *values, np.zeros((MAX_PATCHES, len(Ellipse._fields))))
-    numbers = np.zeros((7, 9 + len(surrogate.layers.biases_4)) if used else (0, 0))
-    return SurrogateScratch(surrogate_work(surrogate), strips, forces, numbers)
+    network = surrogate_work(surrogate)
+    numbers = np.zeros((7, 9 + len(network.outputs)) if used else (0, 0))
+    return SurrogateScratch(network, strips, forces, numbers)
