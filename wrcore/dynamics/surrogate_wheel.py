@@ -2,7 +2,8 @@
 
 Nothing is solved and nothing is kept between evaluations. From a wheel's position to its contact forces:
 
-1. The search finds overlaps. Overlaps that lie near each other form one contact patch.
+1. The search finds overlaps. Neighbours within 0.5 rad are one group, those of a group that lie near each other one
+   contact patch.
 2. The damping lifts the wheel (:mod:`wrcore.dynamics.lift`); so do the other patches of the same group of overlaps.
 3. Strips across the patch give 38 descriptors, and these the network's outputs.
 4. `press_patch`: normal force, semi-axes, place and contact angle.
@@ -49,15 +50,15 @@ _ROUNDS = 5
 round reduces the change of the loads to a tenth."""
 
 _LEAST_FRICTION = 0.04
-"""Friction below which the network is not trained; its creep force at this value is scaled."""
+"""Friction that the network's inputs have below it; forces are those at the true friction."""
 
 _MOST_LOG_LOAD, _MOST_LOG_AXIS, _MOST_ANGLE = 0.6, 0.8, 0.15
 """Bounds of what the network adds to ln N, ln a and ln b, and to the contact angle (rad). In training 99.9 % of the
 corrections are below half of them."""
 
 _MOST_PLACE, _MOST_WIDTH = 3.0, 3.0
-"""Bounds of the place across the patch and of the variance of its width, over sigma and sigma^2; a parabolic overlap
-has 0 and 1.4."""
+"""Bounds of the place across the patch over sigma, and half of that of the variance of its width over sigma^2; a
+parabolic overlap has 0 and 1.4."""
 
 _MOST_MOMENT = 1.0
 """Bound of what the network adds to the moment about the normal, over friction times N times c."""
@@ -107,7 +108,7 @@ class Rolled(NamedTuple):
 def bounded(x, bound):
     """x up to half of the bound, then a curve that joins smoothly and never reaches the bound."""
     half = 0.5 * bound
-    over = abs(x) - half
+    over = min(abs(x) - half, 1e6 * half)  # of infinity, too
     if not over > 0.0:
         return x if x == x else 0.0
     return math.copysign(half + over / math.sqrt(1.0 + (over / half) * (over / half)), x)
@@ -135,8 +136,9 @@ def _lifted_wheel(m, lift, rise, tilt, ellipse):
 
 
 class LiftedPatch(NamedTuple):
-    """A patch of a wheel that damping and other patches lift: its form, the rail coordinate of the wheelset's centre
-    less its place across the track (m), and what the tilt by other patches adds to the place across and up (m)."""
+    """A patch of a wheel that damping and other patches lift: its form, what leads from a rail coordinate to the place
+    across the track from the wheelset's centre (m), and what the tilt by other patches adds to the place across and up
+    (m)."""
 
     shape: PatchShape
     aside: float
@@ -287,7 +289,7 @@ def _couple(model, count, forces):
         one = ellipse_of(forces.ellipses[q])
         rise = tilt = xi = eta = 0.0
         for r in range(count):
-            if r == q or forces.load[r] <= 0.0 or one.a <= 0.0:
+            if r == q or not (forces.load[r] > 0.0 and one.a > 0.0):
                 continue
             other = ellipse_of(forces.ellipses[r])
             value, slope = rise_by_pressure(one, other)

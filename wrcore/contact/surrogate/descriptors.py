@@ -16,7 +16,7 @@ ln(sigma/l) alone, a one-to-one function of its ratio of curvatures.
 21, 22      <(A(s)/A - 1) e>, <(A(s)/A - 1)(e^2 - 1)>: change of the wheel's radius across the patch
 23 to 25    <x>/r0, <(x - <x>) e>/sigma, <(x - <x>)(e^2 - 1)>/l: where strips touch along the rail, by yaw
 26 to 28    delta = <angle>, slope of the axle, ln(friction)
-29          sin(delta - slope)/friction: spin over that of saturation
+29          sin(delta - slope)/friction: in proportion to spin over that of saturation
 30 to 33    c_k = <(angle - delta)(e, e^2 - 1, e^3, e^4 - 3)>: how much the patch is bent across
 34 to 37    c_k/friction: slip by that over the slip of saturation
 ==========  =================================================================================================
@@ -69,8 +69,8 @@ class PatchShape(NamedTuple):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def parabola_at(mean, first, second, third, e, spread):
-    """Mean over a width of the parabola with these coefficients at the place ``e``; ``spread`` is the variance of the
-    width."""
+    """Mean of the parabola with these coefficients over a load that is centred at ``e`` and has the variance
+    ``spread``."""
     return mean + (first - second * third) * e + second * (e * e + spread - 1.0)
 
 

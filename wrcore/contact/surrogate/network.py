@@ -2,7 +2,7 @@
 
 Weights are kept in single precision, and evaluated in double precision: implicit methods take differences of contact
 forces, and the rounding of single precision (1e-7 of the load) makes a vehicle that runs quietly take 1.7 times the
-steps with rodas5, even where its Jacobian is exact. One evaluation would take half the time.
+steps with rodas5, even where its Jacobian is exact. Single precision would halve the time of an evaluation.
 
 Activation x (1 + x / sqrt(x^2 + 4)) / 2: smooth, with a square root in place of an exponential. Inputs are shifted,
 scaled, and compressed by x / (1 + x^2)^(1/4), which grows with the square root of a large input.
@@ -88,7 +88,8 @@ def no_surrogate():
 
 def surrogate_work(surrogate):
     """`SurrogateWork` of a `Surrogate`."""
-    width = max(N_DESCRIPTORS, len(surrogate.layers.biases_1))
+    layers = surrogate.layers
+    width = max(N_DESCRIPTORS, len(layers.biases_1), len(layers.biases_2), len(layers.biases_3))
     sizes = N_DESCRIPTORS, width, width, len(surrogate.layers.biases_4)
     return SurrogateWork(*(np.zeros(size) for size in sizes))
 

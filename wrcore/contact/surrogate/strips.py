@@ -172,7 +172,8 @@ def _add_end(strips, low, count):
     """Add what sums over nodes miss where the gap changes its sign between the nodes ``low`` and ``low + 1``.
 
     There the overlap falls to 0 as a straight line, at the share theta of the step from the node inside. A sum of its
-    square lacks rise^2 h B3(theta)/3, with the third Bernoulli polynomial (Euler-Maclaurin formula)."""
+    square lacks rise^2 h B3(theta)/3, with the third Bernoulli polynomial (Euler-Maclaurin formula). At an end of the
+    rail's profile, where the gap rises by more, nothing is added."""
     gap, next_gap = strips.gap[low], strips.gap[low + 1]
     rise = abs(next_gap - gap)
     inside = -min(gap, next_gap) / rise
@@ -180,10 +181,11 @@ def _add_end(strips, low, count):
     for values in (strips.arc, strips.angle, strips.curvature, strips.ahead, strips.lateral, strips.cosine,
                    strips.height):  # fmt: skip
         values[count] = values[low] + share * (values[low + 1] - values[low])
-    rise *= strips.cosine[count]
     bernoulli = inside * (1.0 - inside) * (0.5 - inside)
     strips.gap[count] = 0.0
-    strips.weight[count] = (strips.arc[low + 1] - strips.arc[low]) * rise * rise * bernoulli / 3.0
+    is_end_of_rail = rise > STEEP * (strips.lateral[low + 1] - strips.lateral[low])
+    arc, rise = strips.arc[low + 1] - strips.arc[low], rise * strips.cosine[count]
+    strips.weight[count] = 0.0 if is_end_of_rail else arc * rise * rise * bernoulli / 3.0
 
 
 class _Depths(NamedTuple):
@@ -202,10 +204,13 @@ class _Depths(NamedTuple):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _rise_at(gap, n, k):
-    """What the gap changes by from node to node at the node ``k`` of ``n``."""
+def _rise_at(gap, n, k, most):
+    """What the gap changes by from node to node at the node ``k`` of ``n``; changes beyond ``most`` are those at an end
+    of a profile, and do not count."""
     before, after = max(k - 1, 0), min(k + 1, n - 1)
-    return (gap[after] - gap[before]) / (after - before)
+    before = before if abs(gap[k] - gap[before]) < most else k
+    after = after if abs(gap[after] - gap[k]) < most else k
+    return (gap[after] - gap[before]) / max(after - before, 1)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -217,11 +222,11 @@ def _with_end(strips, n, low, step, total):
     The rise is that of both nodes, interpolated. With the difference between them the second number would jump by 1e-4
     of the depth where the end passes a node, as B2 is not 0 there."""
     k, other = (low, low + 1) if strips.gap[low] < 0.0 else (low + 1, low)
-    difference = strips.gap[other] - strips.gap[k]
-    if difference > STEEP * step:  # the profile ends there
+    difference, most = strips.gap[other] - strips.gap[k], STEEP * step
+    if difference > most:  # the profile ends there
         return total
     theta = -strips.gap[k] / difference
-    rise = abs((1.0 - theta) * _rise_at(strips.gap, n, k) + theta * _rise_at(strips.gap, n, other))
+    rise = abs((1.0 - theta) * _rise_at(strips.gap, n, k, most) + theta * _rise_at(strips.gap, n, other, most))
     less = theta * (1.0 - theta)
     square, fall = step * rise * rise * less * (0.5 - theta) / 3.0, step * rise * (less - 1.0 / 6.0)
     slope = strips.rail_slope[k] + theta * (strips.rail_slope[other] - strips.rail_slope[k])
@@ -256,7 +261,7 @@ def fill_strips(geometry, pose, row, low, high, strips):
     ``row`` is one of its overlaps (a row of patches, overwritten in OUTSIDE and BEYOND). Returns the number of strips,
     0 if there are fewer than three, and their spacing on the wheel, m."""
     step = geometry.wheel_step
-    margin = 4.0 * step if high - low < 0.75 * ENOUGH * step else 24.0 * step  # two nodes beyond each end
+    margin = 4.0 * step if high - low < 0.7 * ENOUGH * step else 24.0 * step  # room for nodes beyond the ends
     row[OUTSIDE], row[BEYOND] = low - margin, high + margin
     nodes, wheel, rail = smooth_nodes(geometry, pose, row)
     stride = 1 if nodes.end <= ENOUGH else 2 if nodes.end <= 2 * ENOUGH else 4
@@ -266,7 +271,7 @@ def fill_strips(geometry, pose, row, low, high, strips):
     is_planar, reach = pose.tilt == 0.0 and pose.ex != 0.0, geometry.half_distance + nodes.u
     if is_planar or changes_along(geometry) or leaves_cells(pose):
         n = _fill_one_by_one(geometry, nodes, first, stride, pose, (low, high), strips)
-    elif stride == 1:
+    elif stride == 1:  # compiled without gathers
         n = _fill_nodes(nodes, 0, 1, wheel, rail, pose, reach, (low, high), strips)
     else:
         n = _fill_nodes(nodes, first, stride, wheel, rail, pose, reach, (low, high), strips)
@@ -278,7 +283,8 @@ def fill_strips(geometry, pose, row, low, high, strips):
 def press_strips(geometry, pose, lean, strips, n, step):
     """`Pressed` of ``n`` strips at nodes that are ``step`` (m) apart, in axes that ``lean``; its moments are 0."""
     zero = lanes.lanes8(0.0)
-    lanes.put8(strips.gap, np.uint64(n), zero)
+    for values in (strips.gap, strips.lateral, strips.rail_slope, strips.ahead, strips.height):
+        lanes.put8(values, np.uint64(n), zero)
     square, depth, sloped, aside, ahead, ahead_sloped, up, up_sloped = zero, zero, zero, zero, zero, zero, zero, zero
     for start in range(0, n, LANES):
         k = np.uint64(start)
