@@ -11,7 +11,16 @@ from wrcore.contact.moved import smooth_nodes
 from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
 from wrcore.contact.strip import make_pose
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, describe
-from wrcore.contact.surrogate.strips import ENOUGH, _add_end, _fill_one_by_one, close_strips, fill_strips, new_strips
+from wrcore.contact.surrogate.strips import (
+    ENOUGH,
+    _add_end,
+    _Depths,
+    _fill_one_by_one,
+    _with_end,
+    close_strips,
+    fill_strips,
+    new_strips,
+)
 from wrcore.dynamics.vector import copy_into
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
@@ -64,3 +73,30 @@ def test_strips_of_a_wide_overlap_give_the_descriptors_of_all_its_nodes(y):
     if total > ENOUGH:
         assert n <= ENOUGH + 1
     np.testing.assert_allclose(out[0], out[1], rtol=3e-4, atol=3e-4)
+
+
+def parabola_with_end_of_rail(beyond):
+    """Strips over a parabolic overlap of 4 mm; the rail's profile ends ``beyond`` nodes after the first one outside."""
+    n, step, strips = 24, 2e-4, new_strips()
+    place = step * (np.arange(n) - 11.3)
+    strips.gap[:n], strips.lateral[:n], strips.arc[:n] = 15.0 * (place**2 - 2e-3**2), place, place
+    strips.cosine[:n] = 1.0
+    outside = np.flatnonzero(strips.gap[:n] < 0.0)[-1] + 1
+    strips.gap[outside + beyond : n] = 1.0
+    return strips, n, step, outside
+
+
+def test_end_of_the_rail_beside_an_overlap_adds_nothing():
+    strips, n, step, outside = parabola_with_end_of_rail(0)
+    nothing = _Depths(*[0.0] * len(_Depths._fields))
+    assert _with_end(strips, n, outside - 1, step, nothing) == nothing
+    count = close_strips(strips, n)
+    assert count == n + 2 and strips.weight[n] != 0.0 and strips.weight[n + 1] == 0.0
+
+
+def test_rise_at_the_end_of_an_overlap_does_not_see_the_end_of_the_rail_behind():
+    nothing = _Depths(*[0.0] * len(_Depths._fields))
+    (near, n, step, outside), (far, *_) = parabola_with_end_of_rail(1), parabola_with_end_of_rail(9)
+    expected = _with_end(far, n, outside - 1, step, nothing)
+    assert expected.depth != 0.0
+    assert _with_end(near, n, outside - 1, step, nothing).depth == pytest.approx(expected.depth, rel=0.1)
