@@ -309,12 +309,6 @@ def test_overrides_from_a_generator_are_those_of_a_list():
             load_scene(scene, (text for text in [wrong]))
 
 
-@pytest.mark.parametrize("changes", [{"control": {"c": {}}}, {"track.support": {}}, {"initial": {"bodies": {}}}])
-def test_empty_mapping_among_changes_is_refused(changes):
-    with pytest.raises(InputError, match="^changes: [a-z.]+: expected keys in this mapping, got none, which changes"):
-        load_scene(SCENES / "wheelset.yaml", changes)
-
-
 def test_changes_that_contain_themselves_are_one_line():
     deep: dict = {}
     deep["a"] = deep

@@ -85,8 +85,6 @@ def _flat(changes, prefix=""):
     for key, value in changes.items():
         path = prefix + str(key).replace("__", ".")
         if isinstance(value, Mapping) and not path.endswith(WHOLE):
-            if not value:
-                raise InputError("changes", path, "expected keys in this mapping, got none, which changes nothing")
             yield from _flat(value, f"{path}.")
         else:
             if is_masked(value):

@@ -27,9 +27,6 @@ class VoidKey(NamedTuple):
     why: str
 
 
-WHOLE = "track."
-"""Keys of a mapping that changes hold as a whole, with its defaults: these count as left out there, too."""
-
 say_once = cache(tell)
 """Say a line, once in a process."""
 
@@ -92,7 +89,7 @@ def leave_out_void_keys(
     changes = {key: value for key, value in (changes or {}).items() if value is not None}
     for key, by, is_void, why in VOID_KEYS:
         value, other, default = _at(data, key), _at(data, by), _defaults().get(key)
-        is_stated = value is not None and (value != default or (key in changes and not key.startswith(WHOLE)))
+        is_stated = value is not None and (value != default or key in changes)
         if not is_stated or not is_void(other) or by in undecided:
             continue
         beside = by if other is None else f"{by} {short(other)}"
