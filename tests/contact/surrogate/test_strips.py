@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore.contact.approach import LEVEL, Pressed, pressed_together
 from wrcore.contact.detection import find_patches
 from wrcore.contact.moved import smooth_nodes
 from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
@@ -19,7 +20,9 @@ from wrcore.contact.surrogate.strips import (
     _with_end,
     close_strips,
     fill_strips,
+    lift_strips,
     new_strips,
+    press_strips,
 )
 from wrcore.dynamics.vector import copy_into
 from wrcore.kernels.handles import Handle
@@ -100,3 +103,93 @@ def test_rise_at_the_end_of_an_overlap_does_not_see_the_end_of_the_rail_behind()
     expected = _with_end(far, n, outside - 1, step, nothing)
     assert expected.depth != 0.0
     assert _with_end(near, n, outside - 1, step, nothing).depth == pytest.approx(expected.depth, rel=0.1)
+
+
+AT = {"tread": -2e-3, "crown": 0.0, "root": 5.6e-3, "flange": 7.2e-3}
+"""Lateral displacements of a left wheel, m."""
+LIFT = 1.5e-6, 4e-6
+"""Distance across the track and up by which strips are moved, m."""
+
+
+@jit(allocates=False)
+def fill_at(geometry, y, z, rows, row, strips):
+    """Fill strips of the first overlap, if there is only one; returns their number, spacing, and the pose."""
+    along = math.sqrt(1.0 - YAW * YAW)
+    pose = make_pose(1.0, y, z, -YAW, along, 0.0, True)
+    if find_patches(geometry, 1.0, y, z, -YAW, along, 0.0, True, MOMENT, rows) != 1:
+        return 0, 0.0, pose
+    copy_into(row, rows[0])
+    n, step = fill_strips(geometry, pose, row, rows[0, OUTSIDE], rows[0, BEYOND], strips)
+    return n, step, pose
+
+
+@jit(allocates=False)
+def press_both(geometry, y, z, rows, row, strips, sums, out):
+    """Fill ``out`` with what the strips have pressed, and with the same by the sums of the search."""
+    n, step, pose = fill_at(geometry, y, z, rows, row, strips)
+    if n > 0:
+        one = press_strips(geometry, pose, LEVEL, strips, n, step)
+        other = pressed_together(geometry, pose, True, LEVEL, rows, 0, 1, sums)
+        for k in range(len(one)):
+            out[0, k], out[1, k] = one[k], other[k]
+    return n
+
+
+@jit(allocates=False)
+def move_both(geometry, y, z, dy, dz, rows, row, strips, moved):
+    """Fill strips that are moved, and those of the moved wheel; returns their numbers."""
+    n, _, _ = fill_at(geometry, y, z, rows, row, strips)
+    if n == 0:
+        return 0, 0
+    lift_strips(strips, n, dy, dz)
+    copy_into(row, rows[0])
+    pose = make_pose(1.0, y + dy, z + dz, -YAW, math.sqrt(1.0 - YAW * YAW), 0.0, True)
+    return n, fill_strips(geometry, pose, row, rows[0, OUTSIDE], rows[0, BEYOND], moved)[0]
+
+
+def lowered(fill):
+    """Height of the wheelset's centre at which the first overlap is 60 um deep, by a function of the height."""
+    z = 0.47
+    while z > 0.4 and not (fill(z) and fill.rows[0, PENETRATION] > 6e-5):
+        z -= 1e-5
+    return z
+
+
+class Filled:
+    """Strips of a left wheel of the example wheelset at a lateral displacement."""
+
+    def __init__(self, y):
+        self.handle, self.y = Handle(load_scene(SCENES / "suspended_wheelset.yaml").alike.geometry), y
+        self.rows, self.row = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS)
+        self.strips, self.moved, self.sums = new_strips(), new_strips(), np.zeros((3, 5))
+
+    def __call__(self, z):
+        return fill_at(self.handle, self.y, z, self.rows, self.row, self.strips)[0]
+
+
+@pytest.mark.parametrize("place", AT)
+def test_strips_press_as_the_search_does(place):
+    filled, out = Filled(AT[place]), np.zeros((2, len(Pressed._fields)))
+    z = lowered(filled)
+    assert press_both(filled.handle, filled.y, z, filled.rows, filled.row, filled.strips, filled.sums, out) > 0
+    found, expected = (Pressed(*row) for row in out)
+    size = math.hypot(expected.across, expected.up)
+    assert found.square == pytest.approx(expected.square, rel=3e-4)
+    assert (found.across, found.up) == pytest.approx((expected.across, expected.up), abs=1e-3 * size)
+    turned = found.about_x, found.about_y, found.about_z
+    expected = expected.about_x, expected.about_y, expected.about_z
+    assert turned == pytest.approx(expected, abs=1e-3 * max(abs(one) for one in expected))
+    assert abs(expected[1]) > 1e-3 * size * 0.75 * YAW
+
+
+@pytest.mark.parametrize("place", AT)
+def test_moved_strips_are_those_of_the_moved_wheel(place):
+    filled = Filled(AT[place])
+    z = lowered(filled)
+    numbers = move_both(filled.handle, filled.y, z, *LIFT, filled.rows, filled.row, filled.strips, filled.moved)
+    assert numbers[0] == numbers[1] > 0
+    n = numbers[0]
+    inside = filled.moved.gap[:n] < 0.0
+    for name, within in (("gap", 1e-9), ("lateral", 1e-9), ("height", 1e-9), ("angle", 1e-5)):
+        one, other = getattr(filled.strips, name)[:n], getattr(filled.moved, name)[:n]
+        np.testing.assert_allclose(one[inside], other[inside], rtol=0.0, atol=within, err_msg=name)

@@ -1,8 +1,8 @@
 """Strips of the wheel across one contact patch, and what the surrogate needs to know of each.
 
 The strips stand at nodes of the wheel profile: at every fourth one on a tread
-(:func:`wrcore.contact.moved.smooth_nodes`), and of these again at every second or fourth one where an overlap is so
-wide that 32 strips or more are left.
+(:func:`wrcore.contact.moved.smooth_nodes`). Where these are more than `ENOUGH`, only every second or every fourth of
+them has a strip; 32 or more are then left.
 """
 
 import math
@@ -31,10 +31,10 @@ from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
 
 MOST_STRIPS = 1024
-"""Most strips of one patch; at 0.1 mm a patch is at most 60 mm wide."""
+"""Most strips of one patch."""
 
 ENOUGH = 64
-"""Nodes beyond which every second one is left out."""
+"""Number of nodes beyond which every second one is left out; beyond twice this number three of four are."""
 
 _END_STRIPS = 16
 """Places kept for the ends of overlaps."""
@@ -75,7 +75,7 @@ class Strips(NamedTuple):
     """Height over the wheelset's centre, m."""
     rail_slope: np.ndarray
     rail_bend: np.ndarray
-    """Slope of the rail below the strip, and what it changes by across the track, 1/m."""
+    """Slope of the rail's profile below the strip, and its derivative across the track, 1/m."""
 
 
 def new_strips():
@@ -85,7 +85,7 @@ def new_strips():
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _load(rows, row, start, stride):
-    """Eight numbers of a row, ``stride`` apart."""
+    """Eight numbers of a row: every ``stride``-th one from ``start`` on."""
     if stride == 1:
         return lanes.load8(rows, np.uint64(row), start)
     return lanes.every8(rows, np.uint64(row), start, np.uint64(stride))
@@ -105,7 +105,7 @@ def _angles(tangent, secant):
 def _fill_nodes(nodes, first, stride, wheel, rail, pose, reach, ends, strips):
     """Fill ``strips`` but for arc and weight at every ``stride``-th node from the ``first`` one on. ``reach``: from the
     wheelset's centre to node 0 along the axle, m; ``ends``: wheel coordinates beyond which no overlap counts. Returns
-    the number of strips. Those of the last eight that are known already are found again."""
+    the number of strips. Strips are filled eight at a time; the last eight may include some that were filled before."""
     grid, n = nodes.grid, (nodes.end - first + stride - 1) // stride
     square, turned, least = grid.tilt_square, pose.tilt * pose.q, lanes.lanes8(1e-3)
     zero, low, high = lanes.lanes8(0.0), lanes.lanes8(ends[0] - nodes.u), lanes.lanes8(ends[1] - nodes.u)
@@ -147,7 +147,8 @@ def _fill_nodes(nodes, first, stride, wheel, rail, pose, reach, ends, strips):
 
 @jit(allocates=False, fastmath=FUSED)
 def _fill_one_by_one(geometry, nodes, first, stride, pose, ends, strips):
-    """As `_fill_nodes` for any position, for rails that change along the track and wheels out of round; slower."""
+    """Fill ``strips`` like `_fill_nodes`, but at any position, also on rails that change along the track and under
+    wheels out of round; slower."""
     n = (nodes.end - first + stride - 1) // stride
     for k in range(n):
         u = nodes.u + nodes.step * (first + stride * k)
@@ -205,8 +206,8 @@ class _Depths(NamedTuple):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _rise_at(gap, n, k, most):
-    """What the gap changes by from node to node at the node ``k`` of ``n``; changes beyond ``most`` are those at an end
-    of a profile, and do not count."""
+    """Change of the gap from node to node at the node ``k`` of ``n``. Changes beyond ``most`` are those at an end of a
+    profile, and do not count."""
     before, after = max(k - 1, 0), min(k + 1, n - 1)
     before = before if abs(gap[k] - gap[before]) < most else k
     after = after if abs(gap[after] - gap[k]) < most else k
@@ -281,7 +282,7 @@ def fill_strips(geometry, pose, row, low, high, strips):
 
 @jit(allocates=False, fastmath=FUSED)
 def press_strips(geometry, pose, lean, strips, n, step):
-    """`Pressed` of ``n`` strips at nodes that are ``step`` (m) apart, in axes that ``lean``; its moments are 0."""
+    """`Pressed` of ``n`` strips at nodes with the spacing ``step`` (m), in axes that ``lean``; its moments are 0."""
     zero = lanes.lanes8(0.0)
     for values in (strips.gap, strips.lateral, strips.rail_slope, strips.ahead, strips.height):
         lanes.put8(values, np.uint64(n), zero)
@@ -316,7 +317,7 @@ def press_strips(geometry, pose, lean, strips, n, step):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def lift_strips(strips, n, dy, dz):
-    """Move ``n`` strips at nodes by little across and up (m)."""
+    """Move ``n`` strips at nodes by a small distance across the track and up (m), with the wheel."""
     for start in range(0, n, LANES):
         k = np.uint64(start)
         bend = dy * lanes.take8(strips.rail_bend, k)
