@@ -1,7 +1,7 @@
 """Keys of a scene that have no effect beside the value of another key.
 
 A scene or its changes that state such a key are refused. Only where a change makes a key of the scene void, the key is
-left out, and one line says so. A key that has its default value in a scene counts as left out.
+left out, and one line says so. A key that has its default value counts as left out.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -89,8 +89,7 @@ def leave_out_void_keys(
     changes = {key: value for key, value in (changes or {}).items() if value is not None}
     for key, by, is_void, why in VOID_KEYS:
         value, other, default = _at(data, key), _at(data, by), _defaults().get(key)
-        is_stated = value is not None and (value != default or key in changes)
-        if not is_stated or not is_void(other) or by in undecided:
+        if value is None or value == default or not is_void(other) or by in undecided:
             continue
         beside = by if other is None else f"{by} {short(other)}"
         if not _is_changed(by, changes) or _is_changed(key, changes):
