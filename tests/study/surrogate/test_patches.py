@@ -31,7 +31,7 @@ def few_patches():
         context.setattr(patches, "UNSOLVED_PATCHES", 6)
         context.setattr(patches, "LEAST_DRAWN", 6)
         draw = patches.draw_positions
-        context.setattr(patches, "draw_positions", lambda random, exact: draw(random, exact, 40))
+        context.setattr(patches, "draw_positions", lambda random, exact, *count: draw(random, exact, 40))
         yield
 
 
@@ -130,14 +130,16 @@ def test_farthest_candidate_is_kept(monkeypatch):
     monkeypatch.setattr(
         patches, "_draw_candidate", lambda *given: patches._Candidate(Pair(None, ""), None, next(drawn))
     )
+    monkeypatch.setattr(patches, "draw_positions", lambda random, exact, count: [One(5.0)])
     monkeypatch.setattr(patches, "scaled_inputs", lambda rows: np.asarray(rows, float))
     best, distance = patches._keep_farthest(None, SMALL._replace(candidates=3), np.zeros((4, 38)))
-    assert best.drawn[0].descriptors[0] == 3.0 and distance == pytest.approx(3.0 * math.sqrt(38))
+    assert [one.descriptors[0] for one in best.drawn] == [3.0, 3.0, 3.0, 5.0]  # and those at its other positions
+    assert distance == pytest.approx(3.0 * math.sqrt(38))
 
 
 def test_distance_is_to_the_nearest():
-    np.testing.assert_allclose(distances([[1.0, 0.0]], [[0.0, 0.0], [1.0, 0.5]]), [0.5])
-    assert np.isinf(distances([[1.0, 0.0]], np.zeros((0, 2)))).all()
+    np.testing.assert_allclose(distances(np.array([[1.0, 0.0]]), np.array([[0.0, 0.0], [1.0, 0.5]])), [0.5])
+    assert np.isinf(distances(np.array([[1.0, 0.0]]), np.zeros((0, 2)))).all()
 
 
 def test_unbounded_is_the_inverse_of_bounded():

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 import wrcore
 from study.surrogate import shards
@@ -23,6 +22,7 @@ from study.surrogate.pairs import random_pair, read_measured
 from study.surrogate.positions import (
     LOADS,
     MOST_ANGLE,
+    POSITIONS,
     TWINS,
     choose,
     choose_twins,
@@ -44,6 +44,10 @@ SHARD_PATCHES = 400
 
 LEAST_DRAWN = 12
 """Patches that a pair must have at its random positions to be used."""
+
+
+SCORED_POSITIONS, SCORED_PATCHES = 300, 100
+"""Random positions of a candidate, and the most patches at them, by which its distance is judged."""
 
 
 class Sampling(NamedTuple):
@@ -69,8 +73,13 @@ def scaled_inputs(descriptors):
 
 
 def distances(descriptors, others):
-    """Distance (n,) of each row of scaled inputs to the nearest of ``others``; infinite where there are none."""
-    return cKDTree(others).query(descriptors)[0] if len(others) else np.full(len(descriptors), np.inf)
+    """Distance (n,) of each row of scaled inputs to the nearest of ``others``; infinite where there are none.
+
+    In 38 dimensions a search tree saves nothing."""
+    if not len(others):
+        return np.full(len(descriptors), np.inf)
+    squares = (descriptors**2).sum(1)[:, None] + (others**2).sum(1) - 2.0 * descriptors @ others.T
+    return np.sqrt(np.maximum(squares.min(1), 0.0))
 
 
 class _Candidate(NamedTuple):
@@ -81,28 +90,30 @@ class _Candidate(NamedTuple):
     drawn: list
 
 
-def _draw_candidate(random, sampling):
-    """A `_Candidate` that has enough patches."""
+def _draw_candidate(random, sampling, positions=POSITIONS):
+    """A `_Candidate` that has enough patches at so many random positions."""
     while True:
         pair = random_pair(random, sampling.measured)
         exact = ExactPatches(pair.on_rail, random_friction(random))
-        drawn = draw_positions(random, exact)
-        if len(drawn) >= LEAST_DRAWN:
+        drawn = draw_positions(random, exact, positions)
+        if len(drawn) * POSITIONS >= LEAST_DRAWN * positions:
             return _Candidate(pair, exact, drawn)
 
 
 def _keep_farthest(random, sampling, known):
     """Of some candidates the one whose patches are farthest from ``known`` scaled inputs, by their median distance, and
     this distance."""
+    if sampling.candidates == 1:
+        return _draw_candidate(random, sampling), np.nan
     best, farthest = None, -1.0
     for _ in range(sampling.candidates):
-        one = _draw_candidate(random, sampling)
-        if sampling.candidates == 1:
-            return one, np.nan
-        distance = float(np.median(distances(scaled_inputs([f.descriptors for f in one.drawn]), known)))
+        one = _draw_candidate(random, sampling, SCORED_POSITIONS)
+        some = [found.descriptors for found in one.drawn[:SCORED_PATCHES]]
+        distance = float(np.median(distances(scaled_inputs(some), known)))
         if distance > farthest:
             best, farthest = one, distance
-    return best, farthest
+    drawn = best.drawn + draw_positions(random, best.exact, POSITIONS - SCORED_POSITIONS)
+    return best._replace(drawn=drawn), farthest
 
 
 def _solved(random, exact, found, is_solved):
