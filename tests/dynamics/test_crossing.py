@@ -157,6 +157,31 @@ def poses_over_it(start, size):
     return states
 
 
+def test_wheels_by_the_surrogate_that_roll_back_see_their_rail_mirrored(tmp_path):
+    """A wheelset that rolls back at s over a rail that is its own mirror image does what one does ahead at -s."""
+    at, near = 6.0, np.linspace(-0.6, 0.6, 49)
+    rail = write_rail(tmp_path, near, lambda s: -3e-3 * math.cos(math.pi * s / 1.2) ** 4)
+    changes = {"contact.patch": "surrogate", "track.crossing": {"slices": str(rail), "at": at, "rail": "both"}}
+    model, start = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ROUND | changes))
+    random, size, wrenches = np.random.default_rng(3), 60, []
+    states = np.repeat(start[None, :], size, axis=0)
+    states[:, 0] = at + random.uniform(-0.5, 0.5, size)
+    states[:, 1] += random.uniform(-0.004, 0.004, size)
+    states[:, 2] -= 1e-4 + 3e-3 * np.cos(math.pi * (states[:, 0] - at) / 1.2) ** 4
+    states[:, 6] += random.uniform(-0.002, 0.002, size)  # half of a yaw
+    mirrored, of_motion, of_wrench = states.copy(), np.array([-1, 1, 1, 1, -1, -1]), np.array([-1, 1, 1, 1, -1, -1])
+    mirrored[:, 0] = 2.0 * at - states[:, 0]
+    mirrored[:, 5:7] *= -1.0
+    mirrored[:, VELOCITY : VELOCITY + 6] *= of_motion
+    equations = Equations(model)
+    for some in (states, mirrored):
+        wrenches.append(np.array([equations(0.0, state) is None or equations.work.rail_wrenches[0].copy()
+                                  for state in some]))  # fmt: skip
+    ahead, back = wrenches[0], wrenches[1] * of_wrench
+    assert np.median(np.abs(ahead[:, :, 0])) > 100.0 and (ahead[:, :, 2] != 0.0).mean() > 0.5
+    np.testing.assert_allclose(back, ahead, rtol=0.0, atol=1e-6 * np.abs(ahead).max())
+
+
 STIFFNESS = 8.1e7
 
 

@@ -138,6 +138,25 @@ def changed_here(geometry):
     return _changed(geometry.along)
 
 
+def _turn(along):
+    for i in range(len(along)):
+        along[i, AHEAD], along[i, LEAN] = -along[i, AHEAD], -along[i, LEAN]
+
+
+@overload(_turn, jit_options=AS_KERNELS)
+def _turn_by_type(along):
+    if isinstance(along, types.BaseTuple):
+        return lambda along: None
+    return _turn
+
+
+@jit(allocates=False, forceinline=True)
+def turn_along(geometry):
+    """Turn what a rail that changes along the track adds to strips end for end, in place: the rail of a wheel that is
+    the mirror image, along x, of the one that has laid it. Done twice, nothing has changed."""
+    _turn(geometry.along)
+
+
 @jit(allocates=False, forceinline=True)
 def lean_at(geometry, ur, pz):
     """Cosine and sine of the angle about the axle between the rail's point under the wheel and what it touches where

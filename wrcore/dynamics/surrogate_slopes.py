@@ -11,6 +11,7 @@ Wheels with patches that press each other are left to differences of the whole w
 from wrcore.contact import reduction
 from wrcore.contact.moved import MOVES
 from wrcore.contact.patch.gap import group_end
+from wrcore.contact.strip import turn_along
 from wrcore.contact.surrogate.network import run_network
 from wrcore.dynamics.contact_blocks import UNCOUNTED, direction_of, move_along
 from wrcore.dynamics.contact_slopes import SAME, SLOPES
@@ -49,10 +50,15 @@ def slopes_of_surrogate(jacobian, model, work):
         for wheel in range(2):
             contact, slopes = contact_of(model.contact, k, wheel), jacobian.slopes[k, wheel]
             slopes[:] = 0.0
+            rolls_back = motion_of(jacobian.motions[k, wheel]).vx < 0.0
+            if rolls_back:
+                turn_along(contact.geometry)
             found = _wheel_slopes(
                 contact, jacobian.motions[k, wheel], work.motions[k, wheel], jacobian.patches[:, k, wheel], slopes,
                 jacobian.wrenches[k], work.strips,
             )  # fmt: skip
+            if rolls_back:
+                turn_along(contact.geometry)
             work.counts[k, wheel] = max(found, 0)
             jacobian.counts[k, wheel] = found if found >= 0 else UNCOUNTED
 

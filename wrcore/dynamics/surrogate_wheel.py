@@ -22,7 +22,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.half_space_coupling import ellipse_of, rise_by_pressure, slip_by_friction, write_ellipse
 from wrcore.contact.normal import contact_modulus, hertz_shape_at
 from wrcore.contact.patch.gap import add_force, group_end
-from wrcore.contact.strip import lean_at, leaning, make_pose, upright
+from wrcore.contact.strip import lean_at, leaning, make_pose, turn_along, upright
 from wrcore.contact.surrogate.descriptors import PatchShape, describe, parabola_at
 from wrcore.contact.surrogate.network import force_remainder, run_network
 from wrcore.contact.surrogate.strips import close_strips, fill_strips, lift_strips, press_strips
@@ -405,6 +405,8 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
             seen = motion_of(motions[i, wheel])
             m = left_ahead(seen)
             wrench[:] = 0.0
+            if seen.vx < 0.0:
+                turn_along(contact.geometry)
             count, bound, is_spatial = detect_patches(contact, m, rows)
             if not mode & PATCHES_ONLY:
                 first = kept = 0
@@ -420,4 +422,6 @@ def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counte
                     mirror_back(rows, count, wrench)
                 if seen.side < 0.0:
                     mirror(rows, count, wrench)
+            if seen.vx < 0.0:
+                turn_along(contact.geometry)
             counts[i, wheel], bounds[i, wheel] = count, bound
