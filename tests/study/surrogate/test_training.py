@@ -8,7 +8,7 @@ from study.surrogate.training_data import is_held_back, load, run_teacher, taugh
 from wrcore.contact.surrogate import network
 from wrcore.errors import InputError
 
-SMALL = {"width": 16, "modes": 4, "batch": 32, "twins": 4, "steps": 2}
+SMALL = {"width": 32, "modes": 8, "batch": 32, "twins": 4, "steps": 2}
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,8 @@ def test_teacher_in_numpy_is_the_network_of_the_package():
     work.descriptors[:] = descriptors[0]
     assert network.run_network(surrogate, work) == 1.0
     np.testing.assert_allclose(corrections[0], work.outputs[:8] * surrogate.corrections, rtol=1e-5, atol=1e-9)
-    np.testing.assert_allclose(run_teacher(weights, descriptors)[1][0], work.outputs[8:], rtol=1e-5, atol=1e-6)
+    coefficients = run_teacher(weights, descriptors)[1][0]
+    np.testing.assert_allclose(coefficients, work.outputs[8 : 8 + len(coefficients)], rtol=1e-5, atol=1e-6)
     expected = [network.force_remainder(surrogate, work.outputs, *place) for place in disk[0]]
     np.testing.assert_allclose(forces[0], expected, rtol=0.0, atol=2e-3)
 
@@ -104,6 +105,19 @@ def test_loaded_weights_give_what_was_trained(training, trained, random_shards, 
     expected = np.array(forces[0]) * training.FORCE_ERRORS
     found = [network.force_remainder(surrogate, work.outputs, *place) for place in disk[0].astype(float)]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=0.02 * np.abs(expected).max())
+
+
+def test_training_begins_with_given_weights(training, trained, random_shards, tmp_path):
+    start = shards.read(trained[0])
+    data, settings = load([random_shards], start=start), training.Settings(**SMALL)
+    training.train(
+        data, settings._replace(rate=1e-9), tmp_path / "weights.npz", "of the start", start, lambda line: None
+    )
+    weights = shards.read(tmp_path / "weights.npz")
+    for name in set(start) - {"digest", "least", "greatest"}:
+        np.testing.assert_allclose(weights[name], start[name], rtol=0.0, atol=1e-3, err_msg=name)
+    assert (weights["least"] <= start["least"]).all() and (weights["greatest"] >= start["greatest"]).all()
+    assert weights["digest"] != start["digest"]
 
 
 def test_training_resumed_is_the_one_in_one_go(training, trained, tmp_path):

@@ -3,8 +3,9 @@
     python -m study.surrogate.training FOLDER --minutes 26 --out weights.npz
 
 needs JAX and optax (pip install "wrcore[surrogate]"). The state is kept in weights.checkpoint.npz; a run that was
-stopped continues from there where it is run again. With --teacher the targets are the outputs of other weights, for a
-smaller network; the patches then need no solution (--unsolved of study.surrogate.patches).
+stopped continues from there where it is run again. With --start the training begins with the weights of a trained
+network, a lower --rate does then. With --teacher the targets are the outputs of other weights, for a smaller network;
+the patches then need no solution (--unsolved of study.surrogate.patches).
 """
 
 import argparse
@@ -23,6 +24,7 @@ import wrcore
 from study.surrogate import shards
 from study.surrogate.loss import N_REST, Batch, bent, loss, new_parameters, predict, slopes
 from study.surrogate.training_data import CORRECTION_ERRORS, FORCE_ERRORS, OUTPUT_SCALE, load
+from wrcore.contact.surrogate.network import N_CORRECTIONS
 from wrcore.errors import InputError
 
 CHUNK = 20
@@ -68,10 +70,21 @@ class State(NamedTuple):
     seconds: float = 0.0
 
 
-def new_state(settings):
-    """`State` before the first step."""
+def new_state(settings, start=None):
+    """`State` before the first step: random, or with the weights ``start`` (arrays by name) of a trained network."""
     parameters = new_parameters(settings.seed, settings.width, settings.modes)
+    if start is not None:
+        parameters = parameters_of(start)
     return State(parameters, _ADAM.init(parameters))
+
+
+def parameters_of(weights):
+    """Parameters of the arrays of weights.npz by name; the inverse of `weights_of`."""
+    return {
+        part: [[jax.numpy.asarray(weights[f"{prefix}{kind}_{k}"]) for kind in ("weights", "biases")]
+               for k in range(1, count + 1)]
+        for part, prefix, count in (("network", "", 4), ("modes", "mode_", 3))
+    }  # fmt: skip
 
 
 @jax.jit
@@ -125,9 +138,9 @@ def advance(state, data, settings):
     return State(parameters, optimiser, state.calls + 1, state.seconds + time.monotonic() - begin), value
 
 
-def digest_of(data, settings, teacher):
-    """SHA-256 of data, settings and teacher, as text."""
-    text = json.dumps([data.digest, settings._asdict(), teacher, wrcore.__version__])
+def digest_of(data, settings, others):
+    """SHA-256 of data, settings and the digests of other weights that count, as text."""
+    text = json.dumps([data.digest, settings._asdict(), others, wrcore.__version__])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -138,14 +151,14 @@ def keep(path, state, digest):
     shards.write(path, arrays | {"calls": state.calls, "seconds": state.seconds, "digest": np.array(digest)})
 
 
-def resume(path, settings, digest):
+def resume(path, settings, digest, start=None):
     """`State` of a checkpoint, or a new one where there is none; InputError where it is of another training."""
-    state = new_state(settings)
+    state = new_state(settings, start)
     if not Path(path).exists():
         return state
     arrays = shards.read(path)
     if str(arrays["digest"]) != digest:
-        expected = "expected a checkpoint of the same data, settings and teacher; delete it or choose another --out"
+        expected = "expected a checkpoint of the same data, settings and weights; delete it or choose another --out"
         raise InputError(str(path), "digest", expected)
     structure = jax.tree.structure((state.parameters, state.optimiser))
     leaves = [jax.numpy.asarray(arrays[f"leaf_{k}"]) for k in range(structure.num_leaves)]
@@ -183,7 +196,7 @@ def errors_of(parameters, patches):
     return f"{', '.join(said)}; loss {float(bent(e).mean()):.3f}, {float(bent(d).mean()):.3f}"
 
 
-def train(data, settings, out, teacher="", report=print):
+def train(data, settings, out, others="", start=None, report=print):
     """Train until the time is over, and write the weights to ``out``; returns the last `State`.
 
     Parameters
@@ -192,14 +205,16 @@ def train(data, settings, out, teacher="", report=print):
     settings : Settings
     out : pathlib.Path
         File of the weights; the checkpoint stands beside it.
-    teacher : str, optional
-        Digest of the weights that the targets are from.
+    others : str, optional
+        Digest of the weights that the targets or the first parameters are from.
+    start : dict, optional
+        Arrays by name of weights with which the training begins; ``settings`` have their sizes.
     report : callable, optional
         Gets one line at a time.
     """
-    digest = digest_of(data, settings, teacher)
+    digest = digest_of(data, settings, others)
     checkpoint = Path(out).with_suffix(".checkpoint.npz")
-    state, kept = resume(checkpoint, settings, digest), time.monotonic()
+    state, kept = resume(checkpoint, settings, digest, start), time.monotonic()
     if state.calls:
         report(f"continues after {state.calls * CHUNK} steps, {state.seconds / 60.0:.1f} min")
     told = share = _rate(settings, state)[1]
@@ -234,13 +249,17 @@ def _options():
     parser.add_argument("--batch", type=int, default=Settings().batch, help="patches of a step (%(default)s)")
     parser.add_argument("--twins", type=int, default=Settings().twins, help="pairs of them (%(default)s)")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rate", type=float, default=Settings().rate, help="of the first steps (%(default)s)")
+    parser.add_argument("--start", type=Path, help="weights to begin with; their sizes count")
     parser.add_argument("--teacher", type=Path, help="weights whose outputs are the targets")
     asked = parser.parse_args()
     if asked.out.suffix != ".npz":
         parser.error(f"--out: expected a name that ends in .npz, got {asked.out}")
     if 2 * asked.twins >= asked.batch:
         parser.error(f"--twins: expected less than half of a batch of {asked.batch}, got {asked.twins}")
-    for name in ("minutes", "width", "modes", "batch"):
+    if asked.start and asked.teacher:
+        parser.error("--start: expected no such option beside --teacher")
+    for name in ("minutes", "width", "modes", "batch", "rate"):
         if not getattr(asked, name) > 0:
             parser.error(f"--{name}: expected more than 0, got {getattr(asked, name)}")
     return parser, asked
@@ -251,12 +270,14 @@ def main():
     parser, asked = _options()
     settings = Settings(**{name: getattr(asked, name) for name in Settings._fields if hasattr(asked, name)})
     try:
-        teacher = shards.read(asked.teacher) if asked.teacher else None
-        data = load(asked.folders, teacher)
-        teacher_digest = shards.digest_of([asked.teacher]) if asked.teacher else ""
+        teacher, start = (shards.read(path) if path else None for path in (asked.teacher, asked.start))
+        if start is not None:
+            settings = settings._replace(width=len(start["biases_1"]), modes=len(start["biases_4"]) - N_CORRECTIONS)
+        data = load(asked.folders, teacher, start)
+        others = shards.digest_of(path for path in (asked.teacher, asked.start) if path)
         n, held, twins = len(data.training.inputs), len(data.held_back.inputs), len(data.twins.step)
         _say(f"{n} patches, among them {twins} pairs of twins; {held} held back")
-        train(data, settings, asked.out, teacher_digest, _say)
+        train(data, settings, asked.out, others, start, _say)
     except InputError as error:
         parser.error(str(error))
 

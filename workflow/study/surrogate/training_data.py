@@ -85,14 +85,20 @@ def scaling_of(descriptors):
     return Scaling(median, scale, least, least + width)
 
 
-def teacher_scaling(teacher):
+def known_scaling(weights):
     """`Scaling` of the weights of a trained network."""
-    return Scaling(*(teacher[name] for name in Scaling._fields))
+    return Scaling(*(weights[name] for name in Scaling._fields))
+
+
+def _joint_scaling(start, own):
+    """`Scaling` with the shift and scale of trained weights, and the range of theirs and other data."""
+    known = known_scaling(start)
+    return known._replace(least=np.minimum(known.least, own.least), greatest=np.maximum(known.greatest, own.greatest))
 
 
 def run_teacher(teacher, descriptors):
     """Corrections (n, N_CORRECTIONS) and coefficients of the force modes (n, modes) of trained weights."""
-    x = teacher_scaling(teacher).compressed(descriptors).astype(float)
+    x = known_scaling(teacher).compressed(descriptors).astype(float)
     for k in (1, 2, 3, 4):
         x = x @ teacher[f"weights_{k}"].astype(float) + teacher[f"biases_{k}"]
         x = 0.5 * x * (1.0 + x / np.sqrt(x * x + 4.0)) if k < 4 else x
@@ -138,10 +144,11 @@ def _random_disk(n):
     return points / (DISK + np.sqrt(DISK**2 + (points**2).sum(-1, keepdims=True)))
 
 
-def load(folders, teacher=None):
+def load(folders, teacher=None, start=None):
     """`TrainingData` of folders with shards.
 
-    With a ``teacher`` (arrays of weights by name) the targets are its outputs, and the shards may be unsolved."""
+    With a ``teacher`` (arrays of weights by name) the targets are its outputs, and the shards may be unsolved. With
+    weights to ``start`` with, inputs are shifted and scaled as theirs."""
     rows, digest = _joined(folders)
     descriptors, disk = rows["descriptors"].astype(float), rows.get("disk")
     if teacher is not None:
@@ -157,7 +164,8 @@ def load(folders, teacher=None):
     if held.all() or not held.any():
         raise InputError(str(folders[0]), "shards", "expected patches of at least two pairs")
     training, held_back = np.flatnonzero(is_usable & ~held), np.flatnonzero(is_usable & held)
-    scaling = teacher_scaling(teacher) if teacher is not None else scaling_of(descriptors[training])
+    scaling = known_scaling(teacher) if teacher is not None else scaling_of(descriptors[training])
+    scaling = _joint_scaling(start, scaling) if start is not None else scaling
     parts = (_part(whole, scaling, some) for some in (training, held_back))
     return TrainingData(scaling, next(parts), _twins(rows, training), next(parts), digest)
 
