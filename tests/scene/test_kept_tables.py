@@ -40,6 +40,19 @@ def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
     assert len(list(folder.glob("seen_*.npz"))) == 3
 
 
+def test_numbers_of_a_table_are_those_of_its_form(tmp_path, monkeypatch):
+    """Where this fails, tables have other numbers than `FORM` says: count it up, and put the new numbers here."""
+    monkeypatch.setattr(kept_tables, "table_folder", lambda: tmp_path)
+    pair = WheelOnRail(named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail", 0.0))
+    rail = read_slices(write_rail(tmp_path, [0.0, 0.02, 0.04], lambda s: 20.0 * s * s)).along(pair.rail)
+    table = kept_table(pair, rail, False)
+    assert kept_tables.FORM == 1 and (table.begin, table.step) == pytest.approx((-0.2, 0.002))
+    section = 2.726300994839e-2, 0.1714213350854, -3.481424511812, 1.847898901318e-2, 183.5510713101
+    np.testing.assert_allclose(table.sections[111, 0, :, 298], section, rtol=1e-7)
+    np.testing.assert_allclose(table.strips[:, 298], [2.175657337727, -0.015605625169], rtol=1e-9)
+    assert table.bounds.mean() == pytest.approx(-0.010229962580443312, rel=1e-7)
+
+
 @pytest.mark.parametrize("fault", ["a byte", "all of another", "no seal", "objects", "empty"])
 def test_kept_table_damaged_is_made_anew_without_a_word(tmp_path, monkeypatch, capsys, fault):
     monkeypatch.setattr(kept_tables, "table_folder", lambda: tmp_path)
