@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.scene import creep
@@ -46,8 +46,9 @@ CHECKS = (
 and attacks."""
 
 FIRST = (
-    "test_workflow", "dynamics/test_energy", "contact/patch", "analysis/contact", "creep", "dynamics",
-    "analysis/contact/test_out_of_round", "integrate", "dynamics/test_corrugation",
+    "test_workflow", "equations/test_energy", "contact/patch", "contact/grid", "contact/normal", "contact/rolling",
+    "analysis/contact", "creep", "bodies", "equations", "forces", "wheels", "track", "jacobian",
+    "analysis/contact/test_out_of_round", "integrate", "track/test_corrugation",
     "run", "vehicle", "balance", "contract", "sweep", "analysis", "test_api", "study", "contact", "test_attack",
     "test_fuzz",
 )  # fmt: skip

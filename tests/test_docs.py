@@ -131,14 +131,14 @@ def test_numbers_in_the_theory_are_those_of_the_code():
     """Constants that a reader will rely on, each as its page prints it."""
     from wrcore.analysis.to_accuracy import BELIEVED, FINER, SAFETY, TIGHTER
     from wrcore.analysis.wear import wear_laws
-    from wrcore.contact.geometry import SCAN_STEP
-    from wrcore.contact.reduction import CURVATURE_FLOOR
+    from wrcore.contact.search.geometry import SCAN_STEP
+    from wrcore.contact.search.reduction import CURVATURE_FLOOR
     from wrcore.creep.build import A_OVER_B
     from wrcore.creep.kalker import GRID_A_OVER_B
     from wrcore.creep.laws import FASTSIM_GRID
     from wrcore.creep.table import DEFAULT_TOLERANCE
-    from wrcore.dynamics.drive import GRIP
-    from wrcore.elements.kinds import damper, friction
+    from wrcore.forces.drive import GRIP
+    from wrcore.forces.kinds import damper, friction
     from wrcore.geometry import irregularity, profile
     from wrcore.integrate import choice, engine, tolerances
     from wrcore.scene.description import load_scene
@@ -239,7 +239,7 @@ def test_the_theory_names_every_kind_of_element_and_every_law():
     """Each in a row of a table: kinds of force elements, wear laws; creep laws in headings."""
     from wrcore.analysis.wear.wear_laws import LAWS
     from wrcore.creep.laws import LAWS as CREEP_LAWS
-    from wrcore.elements.kinds import KINDS
+    from wrcore.forces.kinds import KINDS
 
     rows = {path.stem: re.findall(r"^\| `(\w+)` \|", path.read_text("utf-8"), re.MULTILINE) for path in THEORY}
     schema = yaml.safe_load((ROOT / "wrcore/scene/schemas/wear_law.yaml").read_text("utf-8"))

@@ -37,6 +37,6 @@ def test_every_claim_is_complete_and_stands_once():
 
 
 def test_a_test_that_is_gone_is_found():
-    for name in ("contact/test_normal.py::test_of_nothing", "contact/test_nothing.py::test"):
+    for name in ("contact/test_hertz.py::test_of_nothing", "contact/test_nothing.py::test"):
         with pytest.raises(LookupError):
             source_of(name)

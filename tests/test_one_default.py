@@ -7,8 +7,8 @@ from wrcore.analysis.assessment.assess import STANDARDS
 from wrcore.analysis.contact.loaded import GRIDS, MODELS
 from wrcore.analysis.to_accuracy import QUANTITIES
 from wrcore.cli import parser
-from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS
+from wrcore.contact.search.detection import DETECTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.integrate.integrator import METHODS, REFERENCES

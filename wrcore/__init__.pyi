@@ -34,12 +34,12 @@ from wrcore.analysis.wear.damage import plot_shakedown as plot_shakedown
 from wrcore.analysis.wear.evolve import evolve as evolve
 from wrcore.analysis.wear.local_wear import WheelWear as WheelWear
 from wrcore.analysis.wear.local_wear import local_wear as local_wear
-from wrcore.contact.conicity import conicity_curve as conicity_curve
-from wrcore.contact.first_touch import first_touch as first_touch
 from wrcore.contact.patch.result import Patch as Patch
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack as WheelsetOnTrack
+from wrcore.contact.rigid.conicity import conicity_curve as conicity_curve
+from wrcore.contact.rigid.first_touch import first_touch as first_touch
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack as WheelsetOnTrack
+from wrcore.contact.rolling.ellipse import RollingContact as RollingContact
 from wrcore.creep.cases import creep_force as creep_force
-from wrcore.creep.halfspace import RollingContact as RollingContact
 from wrcore.creep.table import CreepTable as CreepTable
 from wrcore.creep.table import ensure_table as ensure_table
 from wrcore.errors import InputError as InputError

@@ -5,7 +5,7 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.scene.description import compile_scene
 

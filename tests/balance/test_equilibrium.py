@@ -9,9 +9,9 @@ import yaml
 import wrcore as wr
 from tests.conftest import ELLIPTIC, ROOT
 from wrcore.balance.equilibrium import displaced, wheel_loads
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.system import Equations, workspace
+from wrcore.bodies.body import STATE_SIZE, matrix_of
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
 

@@ -7,15 +7,15 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.conftest import ELLIPTIC, ROOT
-from tests.dynamics.test_system import LEVEL, body_state, make_model
+from tests.equations.test_equations_of_motion import LEVEL, body_state, make_model
 from wrcore.analysis.stability.modes import linear_modes
 from wrcore.analysis.stability.stability import at_speed, steady_motion
 from wrcore.balance.linear import linearise, moved_states, steady_running
-from wrcore.contact import reduction
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.search import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Equations, Model, state_size
+from wrcore.equations.equations_of_motion import Equations, Model, state_size
 from wrcore.integrate.integrator import integrate
 from wrcore.run.motion import growth_rate
 from wrcore.scene.description import compile_scene, load_scene

@@ -5,10 +5,10 @@ import pytest
 import yaml
 
 from tests.conftest import ELLIPTIC, ROOT
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.system import Equations
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.forces.drive import undriven
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 

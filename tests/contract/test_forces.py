@@ -16,7 +16,7 @@ from tests.contract.combinations import (
     states,
     wheel_patches,
 )
-from wrcore.contact import reduction as columns
+from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError
 
 LOAD = 54546.0  # N, static wheel load

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from wrcore.contact.rolling.ellipse_influence import panel_counts, patch_panels, resultants, stuck_forces
 from wrcore.creep.kalker import GRID_A_OVER_B, GRID_NU
-from wrcore.creep.operator import panel_counts, patch_panels, resultants, stuck_forces
 
 LEVELS = (32, 48)
 

@@ -10,11 +10,11 @@ import pytest
 
 from tests.conftest import DATA
 from tests.creep.conftest import read
-from wrcore.contact.normal import contact_modulus
-from wrcore.contact.patch.grid import GridPatch, grid_rolling
-from wrcore.contact.patch.grid_pressure import solve_pressure
-from wrcore.contact.patch.surfaces import plane_slip
-from wrcore.creep.halfspace import RollingContact
+from wrcore.contact.grid.grid import GridPatch, grid_rolling
+from wrcore.contact.grid.pressure import solve_pressure
+from wrcore.contact.hertz import contact_modulus
+from wrcore.contact.rolling.ellipse import RollingContact
+from wrcore.contact.search.surfaces import plane_slip
 from wrcore.creep.laws import LAWS, creep_data, creep_force
 from wrcore.creep.table import ensure_table
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from wrcore.contact.rolling.ellipse import DEFAULT_LEVEL, RollingContact
+from wrcore.contact.rolling.ellipse_influence import panel_counts, patch_panels, slip_matrix
 from wrcore.creep.build import random_creepages
-from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.creep.operator import panel_counts, patch_panels, slip_matrix
 
 PATCHES = [(0.1, 0.0), (1.0, 0.0), (7.0, 0.0), (0.5, 0.6), (3.0, -0.9)]
 

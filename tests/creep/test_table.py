@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
+from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import _atan2, _stretch, creepages_at, node_distances, table_lookup
 from wrcore.creep.build import RESOLUTIONS, Resolution, axis_values, build_data, count_cases, random_errors, table_axes
-from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.creep.table import (
     DEFAULT_TOLERANCE,

@@ -177,8 +177,8 @@ def test_smoothing_near_the_advised_one_improves_conicity(kind, spacing, noise):
 
 def conicity_with(kind, curve):
     """At 1, 2 and 3 mm, of a curve beside S1002 or 60E1 at 1/40."""
-    from wrcore.contact.conicity import conicity_curve
-    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+    from wrcore.contact.rigid.conicity import conicity_curve
+    from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 
     pair = {"wheel": S1002, "rail": named_profile("60E1", "rail", 1 / 40)} | {kind: curve}
     side = WheelOnRail(pair["wheel"], pair["rail"])

@@ -20,13 +20,13 @@ import time
 import numpy as np
 
 from tests.integrate.scenes import SCENES, compiled, random_scene
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.track import track_poses
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search import reduction
 from wrcore.integrate.choice import work, work_of
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulation import evaluated
+from wrcore.track.track import track_poses
 
 RTOLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 DEFAULT = ("auto", 1e-4)

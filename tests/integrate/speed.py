@@ -9,9 +9,9 @@ import time
 import numpy as np
 
 from tests.conftest import ELLIPTIC
-from tests.dynamics.giving_track import EXAMPLES
 from tests.integrate.auto import BARS, Measured
-from wrcore.dynamics.system import Equations
+from tests.track.giving_track import EXAMPLES
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.scene.description import compile_scene, load_scene
 
 SPECTRUM = {"spectrum": {"level": "low", "seed": 1, "length": 2000.0, "begin": 20.0}}

@@ -12,7 +12,7 @@ from tests.conftest import SCENES
 from tests.integrate.auto import cost
 from tests.integrate.scenes import SCENES as MEASURED
 from tests.integrate.scenes import compiled, curve, rough
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.integrate import choice, engine
 from wrcore.integrate.integrator import Integration, integrate

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.integrate.engine import NEXT, T
 from wrcore.integrate.integrator import integrate
-from wrcore.integrate.moving_axes import carry, rates_of_increments
+from wrcore.jacobian.moving_axes import carry, rates_of_increments
 from wrcore.scene.description import compile_scene, load_scene
 
 BODIES = 3

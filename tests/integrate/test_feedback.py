@@ -5,12 +5,12 @@ import pytest
 
 from tests.conftest import SCENES
 from tests.integrate.scenes import ARMS, compiled, curve
-from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
-from wrcore.dynamics.joint import evaluate_joints, joint_state
-from wrcore.dynamics.track import track_poses
+from wrcore.bodies.body import STATE_SIZE, rotation_matrix
+from wrcore.bodies.joint import evaluate_joints, joint_state
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.tableaus import EXPLICIT
 from wrcore.scene.description import compile_scene, load_scene
+from wrcore.track.track import track_poses
 
 PAPER = 5.0
 """Baumgarte's alpha and beta in the paper's scenes, 1/s."""

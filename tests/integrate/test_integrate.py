@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC, SCENES
-from tests.dynamics.test_system import body_state, contact, make_model  # noqa: F401 (contact is a fixture)
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Equations
+from tests.equations.test_equations_of_motion import body_state, contact, make_model  # noqa: F401 (contact is a fixture)
+from wrcore.bodies.marker import FRAME
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.integrate import engine
 from wrcore.integrate.choice import fastest_rate

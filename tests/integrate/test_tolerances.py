@@ -5,12 +5,13 @@ import pytest
 
 from tests.conftest import ELLIPTIC, SCENES
 from tests.integrate.scenes import ARMS, FALLING, compiled, rough
-from wrcore.contact import reduction
-from wrcore.dynamics.body import OMEGA, STATE_SIZE, euler_parameters
-from wrcore.dynamics.drive import GRIP
+from wrcore.bodies.body import OMEGA, STATE_SIZE, euler_parameters
+from wrcore.contact.search import reduction
+from wrcore.equations.pace import HALF_GAUGE, RATE, pace
+from wrcore.forces.drive import GRIP
 from wrcore.integrate.integrator import METHODS, STALL_ATTEMPTS, integrate
 from wrcore.integrate.tableaus import ROSENBROCK
-from wrcore.integrate.tolerances import HALF_GAUGE, LENGTH, RATE, SHARE, lightness, pace, step_tolerances
+from wrcore.integrate.tolerances import LENGTH, SHARE, lightness, step_tolerances
 from wrcore.run.simulation import evaluated
 from wrcore.scene.description import compile_scene, load_scene
 

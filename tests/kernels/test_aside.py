@@ -16,7 +16,7 @@ from wrcore.scene.examples import example
 PROGRAM = """
 import json, os, sys
 import numba
-from wrcore.contact.normal import contact_modulus
+from wrcore.contact.hertz import contact_modulus
 from wrcore.kernels import aside
 from wrcore.kernels.jit import jit
 

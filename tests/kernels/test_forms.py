@@ -16,7 +16,7 @@ import pytest
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.errors import TypingError
 
-from wrcore.contact.normal import hertz_ellipse
+from wrcore.contact.hertz import hertz_ellipse
 from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
 from wrcore.kernels.handles import Kernel

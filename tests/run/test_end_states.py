@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC
-from wrcore.contact.patch.strips import MEMORY
+from wrcore.contact.normal.strips import MEMORY
 from wrcore.errors import InputError
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.run.results import load_run

@@ -8,7 +8,7 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 from wrcore.run.shape_along import NAME, ROUGH, ShapesAlong
 
 RADIUS, DEPTH = 0.46, 6e-5

@@ -5,7 +5,7 @@ import pytest
 
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 from wrcore.run.simulate import simulate
 from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS, WIDEST, WIDEST_TURN, exceeded, look_up_errors
 from wrcore.scene.description import compile_scene, load_scene

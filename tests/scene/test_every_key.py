@@ -16,11 +16,11 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
-from tests.dynamics.test_energy import EVERYTHING
+from tests.equations.test_energy import EVERYTHING
 from wrcore.creep.table import ensure_table
-from wrcore.elements.kinds import KINDS
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import _schema, keys_of, read_yaml
+from wrcore.forces.kinds import KINDS
 from wrcore.geometry.standards import named_profile
 from wrcore.run import simulation
 from wrcore.run.checkpoints import digest_of, model_fingerprint
@@ -510,14 +510,14 @@ AIR = {
     "shear_stiffness": 1e5,
 }  # fmt: skip
 OWN_LAW = {
-    "kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:two_in_series",
+    "kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/forces/own_laws.py:two_in_series",
     "parameters": [30.0, 5.0, 4.0], "states": 2,
 }  # fmt: skip
 MORE = [
     AIR, {"kind": "shear_spring", "at": [[0, 0.2, 1.8], [0, 0.2, 1.2]], "stiffness": [20.0, 30.0, 40.0],
           "bending_stiffness": 6.0, "damping": [1.0, 2.0, 3.0], "preload": [1.0, 2.0, 3.0]},
     {"kind": "bump_stop", "direction": "y", "at": [0, 0.2, 1.5], "gap": 0.02, "stiffness": 1e4},
-    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:drag",
+    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/forces/own_laws.py:drag",
      "parameters": [30.0, 5.0], "states": 1},
     {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0,
      "preload": 4.0},
@@ -550,7 +550,7 @@ def vehicle_with(element):
 def test_element_key_changes_the_forces(kind, key):
     schema, bases = KINDS[kind].keys[key], [item for item in [*EVERYTHING, *MORE] if item["kind"] == kind]
     values = {
-        "normal": ["e1"], "direction": ["z", "x"], "law": ["tests/elements/own_laws.py:plain_drag"], "states": [3],
+        "normal": ["e1"], "direction": ["z", "x"], "law": ["tests/forces/own_laws.py:plain_drag"], "states": [3],
         "characteristic": [], "at": [[0.2, 0.1, 1.4], [[0.3, 0.2, 1.7], [-0.4, 0.2, 1.1]]],
     }  # fmt: skip
     if "characteristic" in (key,):

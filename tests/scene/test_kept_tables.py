@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.dynamics.crossing_rails import write_rail
-from wrcore.contact.out_of_round import SlicedWheel
-from wrcore.contact.seen_table import shape_table
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from tests.track.crossing_rails import write_rail
+from wrcore.contact.changing_rails.out_of_round import SlicedWheel
+from wrcore.contact.changing_rails.section_table import shape_table
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.standards import named_profile
 from wrcore.scene import kept_tables

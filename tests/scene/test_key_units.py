@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from wrcore.cli import main
-from wrcore.elements.kinds import KINDS
 from wrcore.errors.checked_yaml import _schema, _unit, keys_of, unit_of_key
+from wrcore.forces.kinds import KINDS
 from wrcore.run.channels import UNIT_SUFFIXES
 from wrcore.sweep.batch import column_unit, write_table
 

@@ -9,8 +9,8 @@ import yaml
 
 from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.cli import main
-from wrcore.contact.reduction import ANGLE, FY, NORMAL
-from wrcore.dynamics.system import Equations, workspace
+from wrcore.contact.search.reduction import ANGLE, FY, NORMAL
+from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.geometry.standards import named_profile

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.vehicle.conftest import element
-from wrcore.dynamics.energy import energy_balance
-from wrcore.elements.law import FIRST, LAST, NUMBERS
+from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
+from wrcore.forces.law import FIRST, LAST, NUMBERS
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
 from wrcore.vehicle.description import build_vehicle

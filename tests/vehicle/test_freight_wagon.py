@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC, ROOT
-from wrcore.dynamics.energy import energy_balance
-from wrcore.elements.law import INNER, NUMBERS, PRESSING_SPRING
+from wrcore.equations.energy import energy_balance
 from wrcore.errors.checked_yaml import read_yaml
+from wrcore.forces.law import INNER, NUMBERS, PRESSING_SPRING
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
 

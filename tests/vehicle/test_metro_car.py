@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
 

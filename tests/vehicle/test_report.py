@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT
-from wrcore.elements.kinds import KINDS
 from wrcore.errors.checked_yaml import parse_value
+from wrcore.forces.kinds import KINDS
 from wrcore.vehicle.description import build_vehicle
 
 TEXT = (ROOT / "reports" / "vehicle_files.md").read_text(encoding="utf-8")

@@ -5,13 +5,13 @@ import pytest
 
 from tests.conftest import ELLIPTIC
 from wrcore.balance.equilibrium import solve_equilibrium
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.creep.laws import LAWS
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.system import Equations
-from wrcore.dynamics.track import TrackModel
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
+from wrcore.track.track import TrackModel
 
 COUPLED = ["vehicle.count=3", "vehicle.spacing=26"]
 

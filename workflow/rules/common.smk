@@ -148,7 +148,7 @@ wildcard_constraints:
 
 
 def sources(*rooms):
-    """Files of rooms (``dynamics``, ``study/contact``) or of single modules (``analysis/motion``).
+    """Files of rooms (``equations``, ``study/contact``) or of single modules (``analysis/motion``).
 
     A rule lists them as inputs, else an edit there would go unnoticed.
     """
@@ -161,10 +161,11 @@ def sources(*rooms):
 
 
 CONTACT = ("kernels", "geometry", "contact")
+FORCES = ("bodies", "creep", "wheels", "track", "forces", "equations", "jacobian")
 SCENE = ("vehicle", "balance", "scene")
-RUN = (*CONTACT, "creep", "elements", "dynamics", "integrate", *SCENE, "run")
+RUN = (*CONTACT, *FORCES, "integrate", *SCENE, "run")
 VEHICLE = ("analysis/assessment/wheels",)
-LOADED = (*CONTACT, "creep", "elements", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
+LOADED = (*CONTACT, *FORCES, "analysis/contact/loaded", "analysis/contact/poses")
 STYLE = ("analysis/pictures/style", "study/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),

@@ -2,7 +2,7 @@
 
 import os
 
-from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.scene.description import load_scene
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_parameters, matrix_of
+from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_parameters, matrix_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import centreline, frame_turn
 

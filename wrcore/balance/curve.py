@@ -19,15 +19,15 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.balance.linear import RANK, moved_states
-from wrcore.contact.reduction import MAX_PATCHES
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Equations, independent_at, internal_states
-from wrcore.dynamics.track import TrackModel
+from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.search.reduction import MAX_PATCHES
+from wrcore.equations.equations_of_motion import Equations, independent_at, internal_states
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import PathData
 from wrcore.geometry.path_pieces import CANT_BASE, COLUMNS, CURVATURE, ROLL, WIDENING, X
 from wrcore.kernels.handles import Handle
+from wrcore.track.track import TrackModel
 
 STEP, SPIN_STEP, SLOWING_STEP = 1e-7, 1e-6, 1e-3
 """Of the difference quotients in places (m, rad), spins (rad/s) and the common acceleration (m/s^2)."""

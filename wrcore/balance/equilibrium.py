@@ -11,13 +11,13 @@ from functools import partial
 
 import numpy as np
 
-from wrcore.contact import reduction
-from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
-from wrcore.dynamics.modes import WARM
-from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Equations, frictionless, internal_states
+from wrcore.bodies.body import EULER, STATE_SIZE, VELOCITY
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Equations, frictionless, internal_states
+from wrcore.forces.suspension import pack_elements
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path
+from wrcore.wheels.modes import WARM
 
 STEP = 1e-7
 """Of the difference quotients: m and rad."""

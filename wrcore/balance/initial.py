@@ -14,20 +14,20 @@ import numpy as np
 from wrcore.balance.bodies import put_bodies
 from wrcore.balance.equilibrium import Equilibrium, solve_equilibrium, stand_on_rails
 from wrcore.balance.linear import cleared, steady_running
-from wrcore.contact import reduction
-from wrcore.contact.detection import axle_direction, find_patches
-from wrcore.contact.normal import contact_modulus
-from wrcore.contact.statics import settle
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
-from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.flexible_track import rails_at
-from wrcore.dynamics.series import equations_of
-from wrcore.dynamics.system import frictionless, independent_at, internal_states, state_size
-from wrcore.dynamics.track import TrackModel
+from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
+from wrcore.contact.hertz import contact_modulus
+from wrcore.contact.rigid.height_at_load import settle
+from wrcore.contact.search import reduction
+from wrcore.contact.search.detection import axle_direction, find_patches
+from wrcore.equations.equations_of_motion import frictionless, independent_at, internal_states, state_size
+from wrcore.equations.many_models import equations_of
 from wrcore.errors import InputError
+from wrcore.forces.drive import undriven
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Handle
+from wrcore.track.flexible_track import rails_at
+from wrcore.track.track import TrackModel
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
@@ -118,7 +118,7 @@ def static_equilibrium(scene, model, at_rest=None):
     """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
     load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is its `rest`.
 
-    Its state is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`). An InputError if there is
+    Its state is one of the model without its drive (:func:`wrcore.forces.drive.undriven`). An InputError if there is
     none near the nominal position.
     """
     at_rest = at_rest or rest(scene, model)
@@ -209,7 +209,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
     rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
     ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's `rest`; ``shared``
-    keeps equations of motion for the next scene (`wrcore.dynamics.series.equations_of`).
+    keeps equations of motion for the next scene (`wrcore.equations.many_models.equations_of`).
     """
     vehicle, data = scene.vehicle, scene.data
     at_rest, driven = at_rest or rest(scene, model), model

@@ -3,7 +3,7 @@
 Coordinates of a body are the displacement of its centre (track axes) and the small rotation of its frame about its own
 axes; with them go the velocity of its centre (track axes) and its angular velocity (body axes). Displacements q and
 velocities u are then related by q' = u, and only accelerations and the rates of the elements' internal states need
-difference quotients. The frame of a wheelset does not spin (see wrcore.dynamics.body): a wheelset has no rotation about
+difference quotients. The frame of a wheelset does not spin (see wrcore.bodies.body): a wheelset has no rotation about
 its axle, and its spin rate is a velocity alone.
 
 Joints are eliminated: with the columns of N a basis of the null space of their Jacobian D, q = N a and u = N b obey all
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.balance.equilibrium import RESIDUAL
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.joint import joint_jacobian
-from wrcore.dynamics.system import Equations, internal_states
+from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
+from wrcore.bodies.joint import joint_jacobian
+from wrcore.equations.equations_of_motion import Equations, internal_states
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""

@@ -61,8 +61,8 @@ def add(commands):
 def run(options):
     import numpy as np
 
-    from wrcore.contact.conicity import conicity_curve
-    from wrcore.contact.first_touch import first_touch
+    from wrcore.contact.rigid.conicity import conicity_curve
+    from wrcore.contact.rigid.first_touch import first_touch
 
     out = output(options.out)
     table_out = output(options.table, option="--table") if options.table else None

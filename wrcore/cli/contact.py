@@ -100,7 +100,7 @@ def add(commands):
 def _pair(options, poses):
     """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail or the wheel is one of slices."""
     from wrcore.cli.options import profile_of, slices_of
-    from wrcore.contact.seen_rail import WheelOnSlices
+    from wrcore.contact.changing_rails.sections import WheelOnSlices
     from wrcore.geometry.profile import GAUGE_DEPTH
     from wrcore.geometry.slices import RailSlices
 
@@ -138,7 +138,7 @@ def _pair(options, poses):
 
 def run(options):
     from wrcore.analysis.contact.poses import POSE_FLAGS, loaded_poses
-    from wrcore.contact.pose_file import read_poses
+    from wrcore.contact.rigid.pose_file import read_poses
 
     out = output(options.out)
     poses = read_poses(options.poses)

@@ -79,7 +79,7 @@ def add_pair(command, slices=""):
 
 def pair_of(options):
     """`WheelsetOnTrack` of the options of `add_pair`, and of those of a right wheel that differs."""
-    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+    from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 
     given = {"right_wheel": None, "right_rolling_radius": None} | vars(options)
     wheel = profile_of(options, options.wheel, "wheel")

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep.axes import CreepTableData, TableAxes, creepages_at, node_distances, table_lookup
-from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at, kalker_data
 
 A_OVER_B = (0.05, 20.0)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
+from wrcore.contact.rolling.ellipse import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
 from wrcore.errors import InputError, one_of

@@ -12,7 +12,8 @@ import numpy as np
 from wrcore.geometry.slices import TURN
 
 BESIDE = 0.01
-"""Length beside a flat over which a wheel sees it yet, m: more than half a window of `wrcore.contact.seen_rail`."""
+"""Length beside a flat over which a wheel sees it yet, m: more than half a window of
+`wrcore.contact.changing_rails.sections`."""
 
 
 def whole_turn(step, pad, low=0.0):

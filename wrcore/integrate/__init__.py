@@ -1,1 +1,1 @@
-"""Time integration: steppers, their tableaus, Jacobian and block elimination, reference integrators."""
+"""Time integration: methods, their tableaus, choice of steps, reference integrators."""

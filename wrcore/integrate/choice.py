@@ -15,15 +15,16 @@ from enum import IntEnum
 
 import numpy as np
 
-from wrcore.dynamics.contract import places
-from wrcore.dynamics.modes import ELLIPSES
-from wrcore.dynamics.system import derivatives_at
-from wrcore.dynamics.track_blocks import without_mass
+from wrcore.equations.equations_of_motion import derivatives_at
+from wrcore.equations.interface import places
+from wrcore.equations.pace import pace
 from wrcore.errors import InputError
 from wrcore.integrate.engine import EVALUATIONS, JACOBIANS, REJECTED, STEPS, T
 from wrcore.integrate.tableaus import ROSENBROCK
-from wrcore.integrate.tolerances import pace, step_tolerances
+from wrcore.integrate.tolerances import step_tolerances
+from wrcore.jacobian.flexible_track import without_mass
 from wrcore.kernels.jit import jit
+from wrcore.wheels.modes import ELLIPSES
 
 CHOICES = ("rodas5", "rk4")
 """What ``auto`` goes by, in the beginning by the first."""

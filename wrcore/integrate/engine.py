@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.contract import after_rejection, before_attempt, outside
-from wrcore.dynamics.control import DUE, NEXT_SAMPLE
-from wrcore.dynamics.modes import STAGE, WARM
-from wrcore.dynamics.system import derivatives_at
-from wrcore.dynamics.vector import copy_into
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry
-from wrcore.integrate.tolerances import pace
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.vector import copy_into
+from wrcore.equations.equations_of_motion import derivatives_at
+from wrcore.equations.interface import after_rejection, before_attempt, outside
+from wrcore.equations.pace import pace
+from wrcore.forces.control import DUE, NEXT_SAMPLE
+from wrcore.jacobian.moving_axes import ANGLE, RATE, carry
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import jit
+from wrcore.wheels.modes import STAGE, WARM
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
 """Outcomes of a chunk of attempts."""
@@ -84,7 +84,7 @@ class Scratch(NamedTuple):
     defect: np.ndarray  # (n,)
     between: np.ndarray  # (n,)
     still: np.ndarray  # (n,): zeros
-    places: np.ndarray  # (k,): where searches started before the attempt, see `wrcore.dynamics.contract.kept_size`
+    places: np.ndarray  # (k,): where searches started before the attempt, see `wrcore.equations.interface.kept_size`
 
 
 class Record(NamedTuple):
@@ -221,7 +221,7 @@ def interpolate(dense, theta, scale, stages, out):
 def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
-    stages at the step's end, see `wrcore.integrate.moving_axes`."""
+    stages at the step's end, see `wrcore.jacobian.moving_axes`."""
     clock = memory.clock
     times, reached = record.times, record.reached[0]
     while reached < times.shape[0] and times[reached] <= clock[T]:

@@ -28,22 +28,23 @@ from dataclasses import replace
 import numpy as np
 from numba import typeof
 
-from wrcore.dynamics.blame import LawWatch, blame
-from wrcore.dynamics.contract import begin, kept_size, places, why_outside
-from wrcore.dynamics.drive import may_drive
-from wrcore.dynamics.system import Equations, state_size
-from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
+from wrcore.equations.equations_of_motion import Equations, state_size
+from wrcore.equations.interface import begin, kept_size, places, why_outside
+from wrcore.equations.own_law_failures import LawWatch, blame
+from wrcore.equations.pace import HALF_GAUGE, pace
 from wrcore.errors import InputError
+from wrcore.forces.drive import may_drive
 from wrcore.integrate import choice, engine
-from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import CHOICES
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, factorise_again, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.integrate.tolerances import HALF_GAUGE, LENGTH, pace, step_tolerances
+from wrcore.integrate.tolerances import LENGTH, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
+from wrcore.jacobian.block_elimination import new_system
 from wrcore.kernels.aside import planning
 from wrcore.kernels.told import reaching
+from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""

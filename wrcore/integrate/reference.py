@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import integrate as scipy_integrate
 
-from wrcore.dynamics.contract import places, why_outside
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.interface import places, why_outside
 from wrcore.errors import InputError
 from wrcore.integrate.trajectory import Trajectory
 

@@ -9,18 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.contract import after_rejection, before_attempt, touching
-from wrcore.dynamics.modes import SPEEDS_GIVEN, STAGE
-from wrcore.dynamics.system import derivatives_at
-from wrcore.dynamics.track_blocks import hold_speeds, imply_speeds, speeds_error
-from wrcore.dynamics.vector import copy_into
+from wrcore.bodies.vector import copy_into
+from wrcore.equations.equations_of_motion import derivatives_at
+from wrcore.equations.interface import after_rejection, before_attempt, touching
+from wrcore.equations.pace import pace
 from wrcore.integrate import engine
-from wrcore.integrate.blocks import factorise, solve_stage
 from wrcore.integrate.engine import accept, error_size, interpolate, judge, keep_short, take_samples, write_outputs
-from wrcore.integrate.jacobian import Jacobian, Joined, Sweep, joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
-from wrcore.integrate.tolerances import pace
+from wrcore.jacobian.block_elimination import factorise, solve_stage
+from wrcore.jacobian.flexible_track import hold_speeds, imply_speeds, speeds_error
+from wrcore.jacobian.jacobian import Jacobian, Joined, Sweep, joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
+from wrcore.jacobian.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.kernels.jit import jit
+from wrcore.wheels.modes import SPEEDS_GIVEN, STAGE
 
 CONTACT_REFRESHES = 20
 """Refreshes of the contacts' part of the Jacobian between two of the whole."""

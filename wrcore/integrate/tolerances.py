@@ -19,22 +19,14 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 
 import numpy as np
 
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.flexible_track import RAILS, track_places
-from wrcore.dynamics.system import internal_states
-from wrcore.dynamics.vector import load
+from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
+from wrcore.equations.equations_of_motion import internal_states
+from wrcore.equations.pace import HALF_GAUGE
 from wrcore.integrate.tableaus import EXPLICIT
-from wrcore.kernels.jit import jit
+from wrcore.track.flexible_track import RAILS, track_places
 
 LENGTH = 0.01
 """Travel that ``rtol`` refers to, m: about the play of a wheelset between the flanges."""
-
-HALF_GAUGE = 0.75
-"""m."""
-
-RATE = 30.0
-"""Velocities' tolerance over that of positions, 1/s. Above 100 explicit methods at their stability bound let forces
-swing by per cents; much below 30 it is velocities alone that count."""
 
 SHARE = {"rodas5": 12.0, "rodas4": 3.0, "rodas4p2": 1.5, "ros34pw2": 0.1, "rk4": 5.0}
 """What a method's estimate of its error is allowed, where that is no good measure of what the run errs by: methods of
@@ -74,25 +66,6 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
         if method in EXPLICIT and model.flexible_track.mass[0] == 0.0:
             weights[places] *= PRESSED
     return (atol + rtol * LENGTH) * SHARE.get(method, 1.0) * weights * np.array([~fast, fast])
-
-
-@jit(allocates=False, inline="always")
-def _forward_speed(state, at):
-    """Speed (m/s) of the body whose state starts at ``at`` along its own x axis, either way."""
-    e0, (e1, e2, e3), (vx, vy, vz) = state[at + EULER], load(state, at + EULER + 1), load(state, at + VELOCITY)
-    return abs(vx + 2.0 * ((e1 * e2 + e0 * e3) * vy + (e1 * e3 - e0 * e2) * vz - (e2 * e2 + e3 * e3) * vx))
-
-
-@jit(allocates=False)
-def pace(wheelsets, least_speed, old, new):
-    """Velocities' tolerance over that of positions in a step between two states, by the slowest of the ``wheelsets``
-    (bodies), 1/s; ``least_speed`` as creepages have it, m/s."""
-    rate = RATE
-    for wheelset in wheelsets:
-        at = STATE_SIZE * wheelset
-        speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), least_speed)
-        rate = min(rate, speed / HALF_GAUGE)
-    return rate
 
 
 def lightness(bodies):

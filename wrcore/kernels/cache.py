@@ -18,7 +18,10 @@ from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 
-KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "elements", "dynamics", "integrate")
+KERNEL_ROOMS = (
+    "kernels", "geometry", "bodies", "contact", "creep", "wheels", "track", "forces", "equations", "jacobian",
+    "integrate",
+)  # fmt: skip
 _KEEP_SECONDS = 14 * 86400
 _ROOT = Path(__file__).parents[1]
 

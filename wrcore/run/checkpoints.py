@@ -6,8 +6,8 @@ from typing import NamedTuple, get_type_hints
 import h5py
 import numpy as np
 
-from wrcore.contact.patch.strips import MEMORY
-from wrcore.dynamics.system import Model
+from wrcore.contact.normal.strips import MEMORY
+from wrcore.equations.equations_of_motion import Model
 from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint

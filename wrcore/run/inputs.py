@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.dynamics.drive import COMMANDED, CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
-from wrcore.dynamics.schedule import Schedules
-from wrcore.dynamics.system import Model
-from wrcore.elements import law
-from wrcore.elements.kinds.actuator import given
+from wrcore.equations.equations_of_motion import Model
+from wrcore.forces import law
+from wrcore.forces.drive import COMMANDED, CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
+from wrcore.forces.kinds.actuator import given
 from wrcore.geometry.track import SIDES
 from wrcore.scene.description import Scene
+from wrcore.track.schedule import Schedules
 
 
 @dataclass(frozen=True)

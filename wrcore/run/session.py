@@ -18,8 +18,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from wrcore.creep.table import show_progress
-from wrcore.dynamics.blame import LawWatch
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.own_law_failures import LawWatch
 from wrcore.errors import InputError, check_number, one_of, short
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.integrate import engine

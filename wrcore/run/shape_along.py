@@ -12,9 +12,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from wrcore.contact import reduction
-from wrcore.contact.out_of_round import STEP, SlicedWheel
-from wrcore.contact.seen_rail import AHEAD, BEND, HEIGHT, WheelOnSlices
+from wrcore.contact.changing_rails.out_of_round import STEP, SlicedWheel
+from wrcore.contact.changing_rails.sections import AHEAD, BEND, HEIGHT, WheelOnSlices
+from wrcore.contact.search import reduction
 from wrcore.geometry.slices import TURN, RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn

@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from wrcore.contact import reduction
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search import reduction
 from wrcore.creep.table import show_progress
-from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.integrate.trajectory import Checkpoint

@@ -12,19 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import wrcore
-from wrcore.contact import reduction
-from wrcore.dynamics.blame import LawWatch
-from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
-from wrcore.dynamics.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
-from wrcore.dynamics.energy import energy_channels
-from wrcore.dynamics.flexible_track import track_places
-from wrcore.dynamics.motion import MOTION
-from wrcore.dynamics.outputs import check_rail_history, drive_history, evaluations_at, motion_history
-from wrcore.dynamics.system import Equations, Model, independent_at, workspace
-from wrcore.dynamics.track import track_poses
-from wrcore.dynamics.wheel import is_elliptic, shaped
+from wrcore.bodies.body import STATE_SIZE, angles, matrix_of
+from wrcore.contact.search import reduction
+from wrcore.equations.energy import energy_channels
+from wrcore.equations.equations_of_motion import Equations, Model, independent_at, workspace
+from wrcore.equations.outputs import check_rail_history, drive_history, evaluations_at, motion_history
+from wrcore.equations.own_law_failures import LawWatch
 from wrcore.errors import InputError
 from wrcore.errors.input_files import digest_of_all
+from wrcore.forces.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.geometry.irregularity import irregularity_extents
 from wrcore.geometry.track import SIDES
 from wrcore.integrate.integrator import integrate, needed_last
@@ -37,6 +33,10 @@ from wrcore.run.shape_along import ShapesAlong
 from wrcore.run.state import State, from_state
 from wrcore.run.validity import exceeded, look_up_errors
 from wrcore.scene.description import Scene, compile_scene
+from wrcore.track.flexible_track import track_places
+from wrcore.track.track import track_poses
+from wrcore.wheels.hertzian_force import is_elliptic, shaped
+from wrcore.wheels.motion import MOTION
 
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
@@ -54,7 +54,7 @@ TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
     "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
 )  # fmt: skip
-"""Of a flexible track, in the order of its freedoms (:mod:`wrcore.dynamics.flexible_track`)."""
+"""Of a flexible track, in the order of its freedoms (:mod:`wrcore.track.flexible_track`)."""
 
 
 def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Model, state_size
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.marker import FRAME
+from wrcore.equations.equations_of_motion import Model, state_size
 from wrcore.errors import InputError
 from wrcore.geometry.path import arc_length_of
 from wrcore.vehicle.description import Vehicle

@@ -29,9 +29,16 @@ positive: in the flange root of S1002 up to 33 mrad of yaw where it is steepest.
 
 import numpy as np
 
-from wrcore.contact import reduction
-from wrcore.contact.detection import PLANAR
-from wrcore.contact.geometry import CURVATURE, LARGEST_OFFSET, OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE, SLOPE, VALUE
+from wrcore.contact.search import reduction
+from wrcore.contact.search.detection import PLANAR
+from wrcore.contact.search.geometry import (
+    CURVATURE,
+    LARGEST_OFFSET,
+    OFFSET_PER_ROLL,
+    OFFSET_PER_YAW_SQUARE,
+    SLOPE,
+    VALUE,
+)
 from wrcore.kernels.handles import values_of
 
 WIDEST = 1.0 / 3.0  # largest semi-axis across rolling over the smaller radius of curvature
@@ -110,7 +117,7 @@ _OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # th
 
 def exceeded(contact, patches, roll, yaw):
     """Counts by name of limits that ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), of
-    :func:`wrcore.dynamics.outputs.evaluations_at` (NaN: none), and ``roll``, ``yaw`` (n, k), rad, of the wheelsets
+    :func:`wrcore.equations.outputs.evaluations_at` (NaN: none), and ``roll``, ``yaw`` (n, k), rad, of the wheelsets
     relative to the track exceed, and of ``patches`` that were looked at.
     """
     counts = {name: int(np.sum(found)) for name, found in flags(contact, patches, roll, yaw).items()}

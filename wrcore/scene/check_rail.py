@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from wrcore.dynamics.check_rail import CheckRails, no_check_rails
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
+from wrcore.track.check_rail import CheckRails, no_check_rails
 
 
 def read_check_rails(data, pairs, source):

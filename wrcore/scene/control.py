@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.control import PITCH, QUANTITIES, ROLLING, SPEEDS, Controls, no_controls
-from wrcore.elements import law
-from wrcore.elements.kinds.actuator import given
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.errors import InputError, one_of, short
+from wrcore.forces import law
+from wrcore.forces.control import PITCH, QUANTITIES, ROLLING, SPEEDS, Controls, no_controls
+from wrcore.forces.kinds.actuator import given
 from wrcore.kernels import own
 
 

@@ -3,7 +3,7 @@
 import os
 from typing import Any
 
-from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data, named_law, own_law
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.errors import InputError

@@ -17,18 +17,15 @@ import numpy as np
 from wrcore.balance.bodies import check_bodies
 from wrcore.balance.initial import initial_state, rest
 from wrcore.balance.initial import static_equilibrium as static_equilibrium
-from wrcore.contact.detection import DETECTIONS
-from wrcore.contact.normal import hertz_table
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.hertz import hertz_table
 from wrcore.contact.patch.model import strip_model
-from wrcore.contact.reduction import MOMENT, REDUCTIONS
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search.detection import DETECTIONS
+from wrcore.contact.search.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
-from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, OWN
-from wrcore.dynamics.crossing import no_crossing
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Model
-from wrcore.dynamics.track import TrackModel
-from wrcore.dynamics.wheel import ContactModel
+from wrcore.equations.equations_of_motion import Model
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import read_source, validate
@@ -40,10 +37,16 @@ from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.named_laws import Laws
 from wrcore.kernels.told import tell
 from wrcore.scene.changes import changes_of, of_a_change, set_at
+from wrcore.scene.changing_rails import (
+    LaidCrossing,
+    read_corrugation,
+    read_crossings,
+    seen_by_wheels,
+    warn_of_rigid_rails,
+)
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.creep import check_creep, creep_of
-from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossings, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
 from wrcore.scene.examples import examples_folder
 from wrcore.scene.friction import Friction, read_friction
@@ -52,9 +55,12 @@ from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, whe
 from wrcore.scene.stored import StoredScene, texts_in
 from wrcore.scene.support import check_support, track_support
 from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
+from wrcore.track.changing_rails import no_crossing
+from wrcore.track.track import TrackModel
 from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
 from wrcore.vehicle.element_parts import try_laws
 from wrcore.vehicle.train import train_of
+from wrcore.wheels.hertzian_force import ContactModel
 
 
 @dataclass(frozen=True, repr=False)

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from wrcore.dynamics.drive import BRAKE, COMMANDED, CONTROLLED, KIND, MOTOR, NUMBER, Drive, no_drive
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.schedule import pack_schedules
+from wrcore.bodies.marker import FRAME
 from wrcore.errors import InputError, one_of
+from wrcore.forces.drive import BRAKE, COMMANDED, CONTROLLED, KIND, MOTOR, NUMBER, Drive, no_drive
 from wrcore.geometry.track import SIDES
 from wrcore.scene.schedule import read_schedule
+from wrcore.track.schedule import pack_schedules
 from wrcore.vehicle.layout import FRAME_NAME
 
-OVER = ("time", "arc_length")  # what tables are over, in the order of the constants in `wrcore.dynamics.drive`
+OVER = ("time", "arc_length")  # what tables are over, in the order of the constants in `wrcore.forces.drive`
 
 
 def read_drive(spec, vehicle, source, commanded=()):

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
 from wrcore.kernels import own
 from wrcore.scene.schedule import read_schedule
+from wrcore.track.schedule import Schedules, pack_schedules
 
 LEAST, MOST = 1e-9, 1.0
 """Bounds of a coefficient."""

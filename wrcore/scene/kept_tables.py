@@ -9,10 +9,10 @@ from contextlib import suppress
 
 import numpy as np
 
-from wrcore.contact.geometry import ContactGeometry
-from wrcore.contact.out_of_round import SlicedWheel
-from wrcore.contact.seen_rail import WheelOnSlices
-from wrcore.contact.seen_table import SeenTable, seen_table, shape_table
+from wrcore.contact.changing_rails.out_of_round import SlicedWheel
+from wrcore.contact.changing_rails.section_table import SeenTable, seen_table, shape_table
+from wrcore.contact.changing_rails.sections import WheelOnSlices
+from wrcore.contact.search.geometry import ContactGeometry
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, table_folder
 from wrcore.kernels.told import told_if_long

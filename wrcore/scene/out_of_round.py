@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from wrcore.contact.out_of_round import SlicedWheel
+from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
@@ -12,7 +12,7 @@ from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.told import warn_once
-from wrcore.scene.crossing import STEEPEST_ALONG
+from wrcore.scene.changing_rails import STEEPEST_ALONG
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01

@@ -5,7 +5,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.input_files import digest_of_file

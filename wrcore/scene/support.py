@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wrcore.dynamics.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
 from wrcore.errors import InputError
+from wrcore.track.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
 
 SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # freedoms of the sleeper
 

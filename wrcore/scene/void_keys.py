@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from wrcore.contact.patch.model import STRIPS
-from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError, short
 from wrcore.errors.checked_yaml import keys_of

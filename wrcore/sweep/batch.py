@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.dynamics.series import equations_of
+from wrcore.equations.many_models import equations_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5

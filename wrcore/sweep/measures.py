@@ -30,14 +30,14 @@ from typing import Any
 
 import numpy as np
 
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE, angles
-from wrcore.dynamics.system import Model
-from wrcore.dynamics.track import track_poses
+from wrcore.bodies.body import STATE_SIZE, angles
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Model
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.derived import UNLOADED, creep_work
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulation import evaluated
+from wrcore.track.track import track_poses
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.dynamics.inertia import principal, tensor_of
-from wrcore.dynamics.joint import Joint, Joints, build_joints
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import PRELOAD, Elements
-from wrcore.dynamics.system import Bodies
+from wrcore.bodies.inertia import principal, tensor_of
+from wrcore.bodies.joint import Joint, Joints, build_joints
+from wrcore.bodies.marker import FRAME
+from wrcore.equations.equations_of_motion import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.forces.suspension import PRELOAD, Elements
 from wrcore.kernels.cache import warn
 from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element

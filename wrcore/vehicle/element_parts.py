@@ -2,12 +2,12 @@
 
 from typing import Any, NamedTuple
 
-from wrcore.dynamics.marker import FRAME
-from wrcore.elements.kind import Along, Turning
-from wrcore.elements.kinds import KINDS, kind_named
-from wrcore.elements.kinds.own_law import try_law
+from wrcore.bodies.marker import FRAME
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import check
+from wrcore.forces.kind import Along, Turning
+from wrcore.forces.kinds import KINDS, kind_named
+from wrcore.forces.kinds.own_law import try_law
 
 
 def check_element(item, source):
@@ -46,7 +46,7 @@ class Part(NamedTuple):
 
     name: str  # of the element
     bodies: tuple[int, int]
-    does: Any  # `wrcore.elements.kind.Spring`, `Turning` or `Along`, seen from the first body
+    does: Any  # `wrcore.forces.kind.Spring`, `Turning` or `Along`, seen from the first body
 
 
 def parts_of(item, layout, load=None):

@@ -1,12 +1,12 @@
-"""Force elements of a vehicle file: preloaded and sorted for the kernels. Kinds: `wrcore.elements.kinds`."""
+"""Force elements of a vehicle file: preloaded and sorted for the kernels. Kinds: `wrcore.forces.kinds`."""
 
 import numpy as np
 
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import pack_elements
-from wrcore.elements.kind import Spring, Turning
-from wrcore.elements.kinds import KINDS
+from wrcore.bodies.marker import FRAME
 from wrcore.errors import InputError
+from wrcore.forces.kind import Spring, Turning
+from wrcore.forces.kinds import KINDS
+from wrcore.forces.suspension import pack_elements
 from wrcore.vehicle.element_parts import parts_of
 from wrcore.vehicle.statics import preloads
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.dynamics.marker import FRAME
+from wrcore.bodies.marker import FRAME
 from wrcore.errors import InputError, one_of
 
 FRAME_NAME = "frame"

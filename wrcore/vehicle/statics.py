@@ -13,9 +13,9 @@ springs, traction rods and bump stops are free of load.
 
 import numpy as np
 
-from wrcore.dynamics.marker import FRAME
-from wrcore.elements.kind import Along, Spring, Turning
+from wrcore.bodies.marker import FRAME
 from wrcore.errors import InputError
+from wrcore.forces.kind import Along, Spring, Turning
 
 UNCARRIED = 1e-6
 """Part of a body's weight that nothing may be left to carry."""

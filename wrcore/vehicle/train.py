@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.vehicle.description import compile_vehicle
 from wrcore.vehicle.layout import FRAME_NAME

@@ -11,7 +11,7 @@ from wrcore.analysis.contact import contacts as module
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.analysis.contact.poses import POSE_FLAGS, ROLLING, STILL, loaded_poses
 from wrcore.cli import main
-from wrcore.contact.reduction import FX, FY, NORMAL
+from wrcore.contact.search.reduction import FX, FY, NORMAL
 
 RADIUS = 0.46
 

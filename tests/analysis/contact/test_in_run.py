@@ -5,13 +5,13 @@ import pytest
 
 from tests.conftest import ELLIPTIC
 from wrcore.analysis.contact.in_run import WheelInRun, patch_in_run
-from wrcore.contact.reduction import NORMAL
-from wrcore.dynamics.motion import MOTION, WheelMotion
+from wrcore.contact.search.reduction import NORMAL
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import load_scene
+from wrcore.wheels.motion import MOTION, WheelMotion
 
 CHANNELS = ["pose", "velocity", "contact", "wheel_motion"]
 SHORT = {"contact.patch": "exact", "contact.resolution": "coarse", "integration.duration": 0.02, "output.rate": 200.0,

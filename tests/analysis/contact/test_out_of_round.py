@@ -12,9 +12,9 @@ from tests.contact.patch import contact_reference as contact
 from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.cli import main
-from wrcore.contact import reduction as columns
-from wrcore.contact.seen_rail import WheelOnSlices
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.changing_rails.sections import WheelOnSlices
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile

@@ -8,15 +8,15 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC
+from tests.contact.grid.test_grid import some_cases
 from tests.contact.patch import contact_reference as contact
-from tests.contact.patch.test_grid import some_cases
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.analysis.contact.poses import STILL, loaded_poses
 from wrcore.cli import main
-from wrcore.contact import reduction as columns
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.pose_file import read_poses
-from wrcore.contact.statics import wheel_at_rest
+from wrcore.contact.hertz import contact_modulus, hertz_table
+from wrcore.contact.rigid.height_at_load import wheel_at_rest
+from wrcore.contact.rigid.pose_file import read_poses
+from wrcore.contact.search import reduction as columns
 from wrcore.geometry.track import SIDES
 
 PAIR = ["--wheel", "S1002", "--rail", "UIC60-MBench", "--inclination", "1/40"]

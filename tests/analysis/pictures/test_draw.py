@@ -18,8 +18,8 @@ from tests.synthetic import hunting_run
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main
-from wrcore.elements import kinds as elements
 from wrcore.errors.checked_yaml import _schema
+from wrcore.forces import kinds as elements
 
 VEHICLES = sorted(path.stem for path in ELLIPTIC.glob("*.yaml"))
 
@@ -49,7 +49,7 @@ ELEMENTS = {
     "damper": {"damping": [1e3, 1e3, 1e3]}, "friction": {"direction": "x", "force": 1e3, "series_stiffness": 1e6},
     "bump_stop": {"direction": "y", "gap": 0.02, "stiffness": 1e6}, "anti_roll_bar": {"stiffness": 1e6},
     "traction_rod": {"stiffness": 1e6, "at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
-    "own_law": {"direction": "x", "law": "tests/elements/own_laws.py:dashpot", "parameters": [1.0]},
+    "own_law": {"direction": "x", "law": "tests/forces/own_laws.py:dashpot", "parameters": [1.0]},
     "actuator": {"direction": "y"},
 }  # fmt: skip
 JOINTS = {

@@ -19,7 +19,7 @@ from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail
 from wrcore.analysis.pictures.plot_run import plot_run
 from wrcore.analysis.wear.damage import plot_shakedown
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 
 

@@ -9,7 +9,7 @@ import pytest
 import wrcore as wr
 from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.cli import main
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 
 TRAILER = ELLIPTIC / "trailer_vehicle.yaml"

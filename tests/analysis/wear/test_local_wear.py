@@ -9,16 +9,16 @@ from wrcore.analysis.contact.in_run import WheelInRun
 from wrcore.analysis.contact.patch import patch as wr_patch
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
 from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
-from wrcore.dynamics.strip_wheel import group_wrench
-from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
 from wrcore.run.derived import creep_work
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
+from wrcore.wheels.exact_force import group_wrench
+from wrcore.wheels.table_force import tabulated_wrench
 
 G, NU, MU = 8.2e10, 0.28, 0.3
 RADIUS = 0.46

@@ -18,7 +18,7 @@ import pandas as pd
 from tests.analysis.contact.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.contact import reduction as columns
+from wrcore.contact.search import reduction as columns
 
 QUANTITIES = {
     "normal": ("normal force at CONTACT's height", 100.0, "%"),

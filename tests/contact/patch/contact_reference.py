@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.contact.patch.surfaces import Motion, contact_plane
-from wrcore.contact.strip import make_pose
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search.strip import make_pose
+from wrcore.contact.search.surfaces import Motion, contact_plane
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile, read_simpack
 from wrcore.geometry.standards import named_profile

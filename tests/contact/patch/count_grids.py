@@ -8,9 +8,9 @@ import sys
 
 import numpy as np
 
+from tests.contact.normal.test_strips import MODULUS, height
 from tests.contact.patch.strip_contact import NormalContact
-from tests.contact.patch.test_normal_strips import MODULUS, height
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.standards import named_profile
 
 LOADS = (1e4, 3e4, 5.5e4, 8e4)

@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrcore.contact.detection import axle_direction, find_patches
-from wrcore.contact.normal import hertz_table
-from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import group_end, rigid_slip
-from wrcore.contact.patch.normal_influence import influence_table
-from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, normal_work
-from wrcore.contact.patch.windows import MORE
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
-from wrcore.contact.statics import height_of_zero
-from wrcore.contact.strip import make_pose
+from wrcore.contact.hertz import hertz_table
+from wrcore.contact.normal import solve
+from wrcore.contact.normal.gap import group_end, rigid_slip
+from wrcore.contact.normal.influence import influence_table
+from wrcore.contact.normal.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, normal_work
+from wrcore.contact.normal.windows import MORE
+from wrcore.contact.rigid.height_at_load import height_of_zero
+from wrcore.contact.search.detection import axle_direction, find_patches
+from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
+from wrcore.contact.search.strip import make_pose
 from wrcore.geometry.track import SIDES
 
 RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from tests.contact.patch.strip_contact import NormalContact
-from wrcore.contact.detection import detect
-from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
-from wrcore.contact.patch.fixed import solve_fixed
-from wrcore.contact.patch.gap import NODE_GAP, NODES, S, frame_of_overlaps, look_over_overlaps
-from wrcore.contact.patch.grading import grade, spread
-from wrcore.contact.patch.solve import LOAD, MEAN_S, MEAN_X, STRIP_ROWS, SUMS, publish
-from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, normal_work
-from wrcore.contact.patch.windows import guess_squares
-from wrcore.contact.statics import height_of_zero
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.hertz import contact_modulus, hertz_ellipse, hertz_table
+from wrcore.contact.normal.fixed_strips import solve_fixed
+from wrcore.contact.normal.gap import NODE_GAP, NODES, S, frame_of_overlaps, look_over_overlaps
+from wrcore.contact.normal.grading import grade, spread
+from wrcore.contact.normal.solve import LOAD, MEAN_S, MEAN_X, STRIP_ROWS, SUMS, publish
+from wrcore.contact.normal.strips import MAX_STRIPS, MEMORY, normal_work
+from wrcore.contact.normal.windows import guess_squares
+from wrcore.contact.rigid.height_at_load import height_of_zero
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search.detection import detect
 from wrcore.geometry.standards import named_profile
 
 MODULUS = contact_modulus(8.2e10, 0.28)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.contact.approach import LEVEL, Pressed, pressed_together
-from wrcore.contact.detection import find_patches
-from wrcore.contact.moved import smooth_nodes
-from wrcore.contact.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
-from wrcore.contact.strip import make_pose
+from wrcore.bodies.vector import copy_into
+from wrcore.contact.search.approach import LEVEL, Pressed, pressed_together
+from wrcore.contact.search.detection import find_patches
+from wrcore.contact.search.moved import smooth_nodes
+from wrcore.contact.search.reduction import BEYOND, MAX_PATCHES, MOMENT, OUTSIDE, PATCH_COLUMNS, PENETRATION
+from wrcore.contact.search.strip import make_pose
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, describe
 from wrcore.contact.surrogate.strips import (
     ENOUGH,
@@ -24,7 +25,6 @@ from wrcore.contact.surrogate.strips import (
     new_strips,
     press_strips,
 )
-from wrcore.dynamics.vector import copy_into
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
 from wrcore.scene.description import load_scene

@@ -9,9 +9,9 @@ from study.report.legible import save_figure
 from study.style import LINES
 from wrcore.analysis.pictures.plot_contact import fig_contact_location
 from wrcore.analysis.pictures.style import ACCENT
-from wrcore.contact.conicity import conicity_curve
-from wrcore.contact.first_touch import first_touch
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.conicity import conicity_curve
+from wrcore.contact.rigid.first_touch import first_touch
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ from study.contact import tables as study
 from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
 from wrcore.analysis.contact.poses import loaded_poses
-from wrcore.contact.detection import axle_direction, detect
-from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
-from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
-from wrcore.contact.statics import height_at_load
-from wrcore.contact.strip import make_pose
-from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+from wrcore.contact.hertz import contact_modulus, hertz_ellipse, hertz_table
+from wrcore.contact.rigid.height_at_load import height_at_load
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+from wrcore.contact.search.detection import axle_direction, detect
+from wrcore.contact.search.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
+from wrcore.contact.search.strip import make_pose
 from wrcore.geometry.standards import named_profile
 
 SIZES = {"gauge": 1.435, "rolling_radius": 0.46, "half_distance": 0.75}

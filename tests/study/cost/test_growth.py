@@ -7,7 +7,7 @@ import pytest
 from study.cost.growth import array_bytes, cache_sizes, findings, identical, over_scenes
 from study.cost.recorded import evaluation, record
 from tests.conftest import ELLIPTIC
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate, simulate_many
 from wrcore.scene.description import compile_scene, load_scene

@@ -9,7 +9,7 @@ from study.cost.runs import batch_table, rejection_table
 from study.cost.search import loaded_wheels, search_costs
 from study.cost.stages import search_all
 from tests.conftest import ELLIPTIC
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.kernels.handles import Handle
 from wrcore.scene.description import compile_scene, load_scene
 

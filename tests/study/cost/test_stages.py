@@ -12,10 +12,10 @@ from study.cost.operations import STAGES, Number, Tally, count_operations, count
 from study.cost.recorded import record
 from study.cost.stages import breakdown, limits, with_limits
 from tests.conftest import ELLIPTIC
-from wrcore.contact import strip
-from wrcore.contact.detection import find_patches
-from wrcore.dynamics import system
-from wrcore.dynamics.system import Equations, workspace
+from wrcore.contact.search import strip
+from wrcore.contact.search.detection import find_patches
+from wrcore.equations import equations_of_motion as system
+from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.scene.description import load_scene
 
 
@@ -68,7 +68,7 @@ def test_counting_equations_are_the_compiled_ones(name, boxes):
 def test_kernels_are_themselves_again_after_counting(wheelset):
     before = find_patches, strip.math, system.element_forces
     count_operations(wheelset, 1)
-    from wrcore.contact.detection import find_patches as after
+    from wrcore.contact.search.detection import find_patches as after
 
     assert (after, strip.math, system.element_forces) == before
     assert strip.math is math

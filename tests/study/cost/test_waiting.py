@@ -8,7 +8,7 @@ import pytest
 from study.cost.recorded import record
 from study.cost.waiting import instructions, looks
 from tests.conftest import ELLIPTIC
-from wrcore.dynamics.system import Equations, fill_many
+from wrcore.equations.equations_of_motion import Equations, fill_many
 from wrcore.scene.description import load_scene
 
 pytestmark = pytest.mark.skipif(

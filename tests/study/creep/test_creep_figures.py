@@ -10,7 +10,7 @@ from study.creep.figures import LAW_STYLES, binned_errors, stick_border
 from study.creep.laws import contact_points
 from study.report.legible import save_figure
 from tests.conftest import ROOT
-from wrcore.creep.halfspace import RollingContact
+from wrcore.contact.rolling.ellipse import RollingContact
 
 DATA = ROOT / "tests" / "data" / "creep"
 FAMILIES = ("exact", "table sdec", "fastsim", "polach", "she", "linear")

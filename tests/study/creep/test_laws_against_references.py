@@ -25,10 +25,10 @@ from study.creep.laws import (
 )
 from study.creep.smoothness import error_map, sized_creepages, smoothness, smoothness_table
 from tests.conftest import ROOT
+from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import scales
 from wrcore.creep.build import Resolution
-from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at, kalker_data
 from wrcore.creep.table import build_table, ensure_table, table_path
 from wrcore.errors import InputError

@@ -7,7 +7,7 @@ import pytest
 
 from study.hard_cases.cases import contacts, prepare, run
 from study.hard_cases.contact import GAP, crests, depth, drops, impacts, pose_sweeps, restitution, slow_push
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 
 
 def test_fast_impacts_keep_the_root_of_the_damping_factor():

@@ -5,7 +5,7 @@ import pytest
 
 from study.patch import creep_modes
 from wrcore.contact.patch.model import MODES, NUMBERS
-from wrcore.dynamics import pair_table as columns
+from wrcore.wheels.table import lookup as columns
 
 
 def remainders(points, poses, parts, seed):

@@ -1,7 +1,7 @@
 """Examples with both patch models in turn."""
 
 from study.patch.example_costs import PATCHES, costs
-from wrcore.dynamics import pair_store
+from wrcore.wheels.table import store as pair_store
 
 
 def test_cells_are_put_together_anew_in_every_run(monkeypatch, tmp_path):

@@ -10,11 +10,11 @@ from matplotlib.colors import to_hex
 
 from study.patch import cells
 from study.report.legible import save_figure
-from wrcore.dynamics.pair_cells import FINER, HARD, YAW, key_of
-from wrcore.dynamics.pair_solver import place_of
-from wrcore.dynamics.pair_store import pair_of
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
+from wrcore.wheels.table.cells import FINER, HARD, YAW, key_of
+from wrcore.wheels.table.solver import place_of
+from wrcore.wheels.table.store import pair_of
 
 COARSE, FINE, WORST = key_of(0, 25, 1, 100, 100, 12), key_of(1, 25, 4, 200, 200, 12), key_of(3, 25, 40, 800, 800, 12)
 STATES, MISSES = (

@@ -8,7 +8,7 @@ from study.contact.tables import study_pair
 from study.patch import page, reference, tables
 from tests.conftest import ROOT
 from wrcore.analysis.contact.loaded import Found, Rolling
-from wrcore.contact import reduction as columns
+from wrcore.contact.search import reduction as columns
 
 PAIR = {"wheel": "S1002", "rail": "UIC60-MBench", "inclination": 0.025, "gauge": 1.435, "rolling_radius": 0.46,
         "half_distance": 0.75}  # fmt: skip

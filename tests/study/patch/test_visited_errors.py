@@ -5,7 +5,7 @@ import pytest
 
 from study.patch.look_up_errors import errors
 from study.patch.visited_errors import PAIRS, SCENES, visited, wheel_errors, with_hollow
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 
 
 @pytest.mark.parametrize("patch", ["tabulated", "surrogate"])

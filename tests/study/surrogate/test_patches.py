@@ -10,15 +10,15 @@ from study.surrogate.pairs import Pair
 from study.surrogate.patches import Sampling, distances, make_shard, write_shards
 from study.surrogate.solution import POINTS, ExactPatches, random_points, unbounded
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.contact import reduction
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search import reduction
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.surrogate.network import FORCE_CELLS, N_CORRECTIONS, WIDTH, Layers, Surrogate
-from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.surrogate_wheel import bounded, surrogate_wrenches
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.handles import Handle
+from wrcore.wheels.motion import WheelMotion
+from wrcore.wheels.surrogate_force import bounded, surrogate_wrenches
 
 SMALL = Sampling(seed=3, shard_patches=5)
 

@@ -8,7 +8,7 @@ from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.report.legible import save_figure
 from wrcore.analysis.pictures.plot_contact import fig_contact_location
-from wrcore.contact.first_touch import first_touch
+from wrcore.contact.rigid.first_touch import first_touch
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params, output = snakemake.params, snakemake.output

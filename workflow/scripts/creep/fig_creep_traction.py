@@ -4,7 +4,7 @@ import sys
 
 from study.creep.figures import fig_creep_traction
 from study.report.legible import save_figure
-from wrcore.creep.halfspace import RollingContact
+from wrcore.contact.rolling.ellipse import RollingContact
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params = snakemake.params

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
-from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError
 from wrcore.run.motion import amplitude, hunting_frequency

@@ -1,8 +1,8 @@
 """Figures of the contact geometry: where the contact lies, what it does to the radii, and the conicity; what planar
 detection misses; what the reductions do to the force.
 
-The first ones work on the table of `wrcore.contact.first_touch.first_touch` and on curves of
-`wrcore.contact.conicity.conicity_curve`, the others on tables of `study.contact.tables`. Units change here and
+The first ones work on the table of `wrcore.contact.rigid.first_touch.first_touch` and on curves of
+`wrcore.contact.rigid.conicity.conicity_curve`, the others on tables of `study.contact.tables`. Units change here and
 nowhere before: lengths to mm, angles to mrad, forces to kN.
 """
 
@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from study.contact.tables import first_order_law, over_contact_angle
 from wrcore.analysis.pictures.style import MM, styled
-from wrcore.contact.conicity import en15302_tolerance
+from wrcore.contact.rigid.conicity import en15302_tolerance
 from wrcore.geometry.track import SIDES
 
 STYLES = (

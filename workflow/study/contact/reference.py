@@ -7,8 +7,9 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from study.contact.tables import MATERIAL
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.reduction import (
+from wrcore.contact.hertz import contact_modulus, hertz_table
+from wrcore.contact.rigid.height_at_load import height_at_load, wheel_at_rest
+from wrcore.contact.search.reduction import (
     ANGLE,
     MAX_PATCHES,
     NORMAL,
@@ -20,7 +21,6 @@ from wrcore.contact.reduction import (
     X,
     Y,
 )  # fmt: skip
-from wrcore.contact.statics import height_at_load, wheel_at_rest
 from wrcore.geometry.track import SIDES
 
 ERRORS = {

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from wrcore.contact.detection import find_patches
-from wrcore.contact.geometry import SCAN_STEP
-from wrcore.contact.reduction import (
+from wrcore.contact.search.detection import find_patches
+from wrcore.contact.search.geometry import SCAN_STEP
+from wrcore.contact.search.reduction import (
     ANGLE,
     CURVATURE_Y,
     MAX_PATCHES,
@@ -19,7 +19,7 @@ from wrcore.contact.reduction import (
     REDUCTIONS,
     U_WHEEL,
 )  # fmt: skip
-from wrcore.contact.strip import gap_at, make_pose
+from wrcore.contact.search.strip import gap_at, make_pose
 from wrcore.kernels.jit import jit
 
 DENSE_STEP = 2e-5
@@ -137,7 +137,7 @@ def _sound(rows, count):
 def judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps):
     """Compare the search with the dense one for one wheel: outcome, strip and depth (m) of the overlap or patch that it
     is about, and the number of overlaps deeper than `DEPTH`; arguments as for
-    :func:`wrcore.contact.detection.find_patches`, ``axle`` pointing outwards, ``overlaps`` (n, 4) is scratch.
+    :func:`wrcore.contact.search.detection.find_patches`, ``axle`` pointing outwards, ``overlaps`` (n, 4) is scratch.
 
     The outcome is FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the deepest count if
     there are more than MAX_PATCHES), INVENTED (a patch outside all groups), SPLIT (more patches in a group than

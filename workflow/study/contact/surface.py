@@ -1,7 +1,7 @@
 """Wheel of revolution and rail swept along the track: Eqs. (1)-(6) of Ferreira, Flores and Marques.
 
 These functions are the readable definition of the surfaces. They serve figures and tests; the contact search
-evaluates the same surfaces in compiled form (:mod:`wrcore.contact.detection`).
+evaluates the same surfaces in compiled form (:mod:`wrcore.contact.search.detection`).
 """
 
 import numpy as np

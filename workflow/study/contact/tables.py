@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.contact.poses import loaded_poses
-from wrcore.contact.conicity import conicity_curve
-from wrcore.contact.detection import planar_error_bound
-from wrcore.contact.first_touch import first_touch
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.reduction import (
+from wrcore.contact.hertz import contact_modulus, hertz_table
+from wrcore.contact.rigid.conicity import conicity_curve
+from wrcore.contact.rigid.first_touch import first_touch
+from wrcore.contact.rigid.height_at_load import height_at_load, settle, wheel_at_rest
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.search.detection import planar_error_bound
+from wrcore.contact.search.reduction import (
     ANGLE,
     MAX_PATCHES,
     MAXIMUM,
@@ -23,9 +25,7 @@ from wrcore.contact.reduction import (
     SEMI_A,
     U_WHEEL,
 )  # fmt: skip
-from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
-from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.search.strip import cubic_at, gap_at, make_pose, strip_point
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.jit import jit
 
@@ -52,7 +52,7 @@ def study_pair(settings):
 
 def touch_table(pairs, shifts):
     """Rigid first touch of several pairs at lateral shifts (n,), m, without yaw: ``pair`` and the columns of
-    :func:`wrcore.contact.first_touch.first_touch` (with roll).
+    :func:`wrcore.contact.rigid.first_touch.first_touch` (with roll).
     """
     tables = {label: first_touch(pair, shifts) for label, pair in pairs.items()}
     return pd.concat(tables, names=["pair"]).reset_index(level="pair").reset_index(drop=True)

@@ -5,11 +5,11 @@ import pandas as pd
 
 from study.cost.recorded import Recorded, evaluation
 from study.cost.timing import summary, take_turns
-from wrcore.dynamics.body import euler_parameters
-from wrcore.dynamics.joint import Joint, build_joints
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Bodies
+from wrcore.bodies.body import euler_parameters
+from wrcore.bodies.joint import Joint, build_joints
+from wrcore.bodies.marker import FRAME
+from wrcore.equations.equations_of_motion import Bodies
+from wrcore.forces.suspension import pack_elements
 
 STATES = 16
 

@@ -8,7 +8,7 @@ import pandas as pd
 
 from study.cost.recorded import evaluation, record
 from study.cost.timing import Contender, summary, take_turns
-from wrcore.dynamics.system import workspace
+from wrcore.equations.equations_of_motion import workspace
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import output_times, simulate_many
 from wrcore.scene.description import compile_scene, load_scene

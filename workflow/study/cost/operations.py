@@ -13,9 +13,10 @@ from types import SimpleNamespace
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from wrcore.dynamics import constraints, wheel
-from wrcore.dynamics.system import workspace
-from wrcore.elements.law import LAW, LAWS
+from wrcore.bodies import joint_forces as constraints
+from wrcore.equations.equations_of_motion import workspace
+from wrcore.forces.law import LAW, LAWS
+from wrcore.wheels import hertzian_force as wheel
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
 """In the order in which they are added up."""
@@ -23,17 +24,17 @@ STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep",
 QUANTITIES = ("flops", "divisions", "roots", "functions", "bytes")
 
 WHERE = {
-    ("wrcore.dynamics.system", "element_forces"): "suspension",
-    ("wrcore.dynamics.system", "add_reactions"): "joints",
-    ("wrcore.dynamics.system", "_add_rail_wrenches"): "rest",
-    ("wrcore.dynamics.wheel", "find_patches"): "patch",
-    ("wrcore.contact.detection", "make_pose"): "search",
-    ("wrcore.contact.detection", "make_window"): "search",
-    ("wrcore.contact.detection", "near_blocks"): "search",
-    ("wrcore.contact.detection", "scan"): "search",
-    ("wrcore.dynamics.wheel", "creepages"): "Hertz",
-    ("wrcore.dynamics.wheel", "normal_ellipse"): "Hertz",
-    ("wrcore.dynamics.wheel", "creep_force_at"): "creep",
+    ("wrcore.equations.equations_of_motion", "element_forces"): "suspension",
+    ("wrcore.equations.equations_of_motion", "add_reactions"): "joints",
+    ("wrcore.equations.equations_of_motion", "_add_rail_wrenches"): "rest",
+    ("wrcore.wheels.hertzian_force", "find_patches"): "patch",
+    ("wrcore.contact.search.detection", "make_pose"): "search",
+    ("wrcore.contact.search.detection", "make_window"): "search",
+    ("wrcore.contact.search.detection", "near_blocks"): "search",
+    ("wrcore.contact.search.detection", "scan"): "search",
+    ("wrcore.wheels.hertzian_force", "creepages"): "Hertz",
+    ("wrcore.wheels.hertzian_force", "normal_ellipse"): "Hertz",
+    ("wrcore.wheels.hertzian_force", "creep_force_at"): "creep",
 }
 """Stage that begins with a function, by the module that calls it and its name there; all else belongs to the caller."""
 
@@ -251,7 +252,7 @@ def interpreted(tally):
     for module in modules:
         for name, value in list(vars(module).items()):
             new = value
-            if (module.__name__, name) == ("wrcore.dynamics.suspension", "_by_law"):
+            if (module.__name__, name) == ("wrcore.forces.suspension", "_by_law"):
                 new = _by_law
             elif isinstance(value, Dispatcher):
                 new = value.py_func
@@ -259,7 +260,10 @@ def interpreted(tally):
                 new = mathematics
             elif name in registers and getattr(value, "__module__", "") == "wrcore.kernels.lanes":
                 new = registers[name]
-            elif name == "call_address" and module.__name__ in ("wrcore.dynamics.system", "wrcore.dynamics.wheel"):
+            elif name == "call_address" and module.__name__ in (
+                "wrcore.equations.equations_of_motion",
+                "wrcore.wheels.hertzian_force",
+            ):
                 new = _call
             elif name == "other_at":
                 new = lambda whole, address: whole  # noqa: E731
@@ -286,7 +290,7 @@ def count_operations(recorded, states=20):
     tally = Tally()
     model, work = counting(recorded.model, tally), counting(workspace(recorded.model), tally)
     with interpreted(tally), np.errstate(all="ignore"):
-        from wrcore.dynamics import system
+        from wrcore.equations import equations_of_motion as system
 
         for state in chosen:
             row = counting(state, tally)

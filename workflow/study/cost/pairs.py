@@ -17,9 +17,9 @@ from study.cost.plain.wheelset import plain_wheelset
 from study.cost.recorded import evaluation, record
 from study.cost.search import search_costs
 from study.cost.timing import Bar, Contender, compare, summary, take_turns
-from wrcore.contact.detection import PLANAR, SPATIAL
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search.detection import PLANAR, SPATIAL
 from wrcore.creep.laws import LAWS
-from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
 from wrcore.run.simulate import output_times

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from study.cost.timing import Contender
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.system import Equations, Model, fill_many
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.equations.equations_of_motion import Equations, Model, fill_many
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene

@@ -7,12 +7,12 @@ import numpy as np
 from study.cost.recorded import lasting
 from study.cost.stages import search_all
 from study.cost.timing import compare
-from wrcore.contact.detection import PLANAR, SPATIAL, axle_direction
-from wrcore.contact.normal import contact_modulus
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
-from wrcore.contact.statics import height_at_load
-from wrcore.dynamics.motion import MOTION
+from wrcore.contact.hertz import contact_modulus
+from wrcore.contact.rigid.height_at_load import height_at_load
+from wrcore.contact.search.detection import PLANAR, SPATIAL, axle_direction
+from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
 from wrcore.kernels.handles import Handle
+from wrcore.wheels.motion import MOTION
 
 PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.0078), (-0.015, 0.015))}
 """Ranges of lateral position (m) and yaw (rad) of the left wheel."""
@@ -23,7 +23,7 @@ LOAD = 5e4
 
 def loaded_wheels(contact, place, count):
     """Left wheels at rest, in random order, that carry `LOAD` at a place (key of `PLACES`): motions
-    (count, 15), as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
+    (count, 15), as `wrcore.wheels.hertzian_force.wheel_wrenches` takes them.
     """
     rng, rows, motions = np.random.default_rng(0), np.empty((MAX_PATCHES, PATCH_COLUMNS)), []
     (low, high), (least, most) = PLACES[place]

@@ -14,17 +14,17 @@ import pandas as pd
 from study.cost.operations import STAGES, count_operations
 from study.cost.recorded import evaluation, lasting, record
 from study.cost.timing import Contender, summary, take_turns
-from wrcore.contact import reduction as columns
+from wrcore.bodies.joint import build_joints
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import SPATIAL, find_patches
-from wrcore.contact.geometry import LANES
-from wrcore.contact.normal import damping_factor, hertz_shape_at, inverse_cube_root
-from wrcore.contact.scan import first_zone, make_window, near_blocks, scan
-from wrcore.contact.strip import make_pose
+from wrcore.contact.hertz import damping_factor, hertz_shape_at, inverse_cube_root
+from wrcore.contact.search import reduction as columns
+from wrcore.contact.search.detection import SPATIAL, find_patches
+from wrcore.contact.search.geometry import LANES
+from wrcore.contact.search.scan import first_zone, make_window, near_blocks, scan
+from wrcore.contact.search.strip import make_pose
 from wrcore.creep.laws import creep_force_at
-from wrcore.dynamics.joint import build_joints
-from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.forces.suspension import pack_elements
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import FUSED, jit
 from wrcore.kernels.lanes import lanes8, load8, ramp8, total

@@ -17,7 +17,7 @@ from collections import Counter
 import numpy as np
 
 from study.cost.recorded import record
-from wrcore.dynamics.system import Equations, fill_many
+from wrcore.equations.equations_of_motion import Equations, fill_many
 from wrcore.errors import InputError
 from wrcore.scene.description import load_scene
 

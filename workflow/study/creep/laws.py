@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep.build import A_OVER_B, PSI_MAX, Resolution, build_data, random_errors
 from wrcore.creep.cases import check_cases, nondimensional
-from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.laws import LAWS, CreepData, creep_data, creep_forces
 from wrcore.creep.table import build_table, table_info
 from wrcore.errors import InputError

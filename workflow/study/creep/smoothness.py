@@ -6,8 +6,8 @@ Units as in `study.creep.laws`: nondimensional creepages and forces.
 import numpy as np
 
 from study.creep.laws import law_forces
+from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep.axes import creepages_at, scales
-from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at
 
 SIZES, DIRECTIONS = 16, 10

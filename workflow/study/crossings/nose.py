@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
-from wrcore.contact import reduction as columns
-from wrcore.contact.seen_rail import WheelOnSlices
+from wrcore.contact.changing_rails.sections import WheelOnSlices
+from wrcore.contact.search import reduction as columns
 
 SIDE = "right"  # that of the crossing
 

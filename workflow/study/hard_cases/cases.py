@@ -13,11 +13,11 @@ import pandas as pd
 from scipy.integrate import simpson
 
 from study.creep_table import with_creep_table
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.outputs import evaluations_at
-from wrcore.dynamics.system import Equations
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.outputs import evaluations_at
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import output_times

@@ -23,9 +23,9 @@ from study.hard_cases.cases import (
     with_forces,
 )
 from wrcore.analysis.contact.poses import loaded_poses
-from wrcore.contact import reduction
-from wrcore.contact.normal import damping_factor
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.hertz import damping_factor
+from wrcore.contact.search import reduction
 from wrcore.geometry.irregularity import irregularity_data
 from wrcore.integrate.tolerances import LENGTH
 from wrcore.vehicle.description import GRAVITY

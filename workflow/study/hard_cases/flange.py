@@ -6,8 +6,8 @@ from itertools import product
 import numpy as np
 
 from study.hard_cases.cases import Check, contacts, prepare, rows, run_in_parts, sound, wheel_forces, with_forces
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search import reduction
 from wrcore.run.simulation import DERAILED_Y
 
 RATE = 500.0

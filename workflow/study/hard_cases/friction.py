@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 
 from study.hard_cases.cases import Check, computed, contacts, prepare, refused, rows, run, sound
-from wrcore.contact import reduction
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.contact.search import reduction
 from wrcore.creep.laws import LAWS, creep_forces
-from wrcore.dynamics.body import STATE_SIZE
 from wrcore.scene.description import load_scene
 
 TABLE_ERROR = 0.01

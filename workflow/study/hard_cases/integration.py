@@ -9,10 +9,10 @@ from scipy.optimize import brentq
 from study.hard_cases.cases import Check, prepare, rows, run, sound
 from wrcore.analysis.stability.stability import LARGEST_REST, straight_ahead
 from wrcore.balance.linear import steady_running
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.constraints import constraint_workspace
-from wrcore.dynamics.joint import evaluate_joints
-from wrcore.dynamics.system import Equations
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.joint import evaluate_joints
+from wrcore.bodies.joint_forces import constraint_workspace
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.integrate.tolerances import LENGTH, SHARE

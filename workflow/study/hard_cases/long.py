@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from study.hard_cases.cases import NORM_LIMIT, Check, prepare, rows
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.results import load_run
 from wrcore.run.streaming import simulate_to

@@ -7,9 +7,9 @@ import numpy as np
 from study.hard_cases.cases import Check, contacts, prepare, rows, run, run_in_parts, sound, with_forces
 from wrcore.analysis.stability.stability import straight_ahead
 from wrcore.balance.linear import steady_running
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.marker import FRAME
+from wrcore.bodies.body import STATE_SIZE, matrix_of
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.search import reduction
 
 DETECTIONS = ("planar", "spatial")
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from study.hard_cases.cases import Check, contacts, impulse_error, prepare, refused, rows, run, sound
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.scene.description import compile_scene

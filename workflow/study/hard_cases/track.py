@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from study.hard_cases.cases import Check, contacts, impulse_error, prepare, rows, run, sound, wheel_forces
-from wrcore.dynamics.marker import FRAME
+from wrcore.bodies.marker import FRAME
 
 CANT_BASE = 1.5
 """Distance over which cant is measured, m."""

@@ -298,7 +298,8 @@ def _rate_of_boxed(t, state, box):
 
 
 def right_hand_side(p, work):
-    """The equations as ``function(t, state)`` for a solver written in Python; see `wrcore.dynamics.system`."""
+    """The equations as ``function(t, state)`` for a solver written in Python; see
+    `wrcore.equations.equations_of_motion`."""
     box = List()
     box.append((p, work))
     return lambda t, state: _rate_of_boxed(t, state, box)

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from study.style import LINES, MARKERS, shared_legend
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.detection import detect
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.reduction import MAXIMUM
-from wrcore.contact.statics import settle
+from wrcore.contact.hertz import contact_modulus, hertz_table
+from wrcore.contact.rigid.height_at_load import settle
+from wrcore.contact.search.detection import detect
+from wrcore.contact.search.reduction import MAXIMUM
 from wrcore.geometry.track import SIDES
 
 

@@ -5,7 +5,7 @@ import pandas as pd
 
 from study.paper.motion import _patches, difference, first_flange_contact, mirror_defect, prediction_horizon
 from wrcore.analysis.contact.poses import loaded_poses
-from wrcore.contact.strip import cubic_at
+from wrcore.contact.search.strip import cubic_at
 from wrcore.geometry.track import SIDES
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 from wrcore.run.simulate import simulate

@@ -15,18 +15,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wrcore.analysis.pictures.style import MM, styled
-from wrcore.contact.approach import LEVEL, pressed_together
-from wrcore.contact.detection import axle_direction, find_patches
-from wrcore.contact.normal import damping_factor
-from wrcore.contact.patch.gap import group_end
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
-from wrcore.contact.strip import make_pose
-from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, YAW, YAWS, corner_of, steps_of
-from wrcore.dynamics.pair_store import _PAIRS, WRONG, Pair, pair_of
-from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end, log_depth_of
+from wrcore.contact.hertz import damping_factor
+from wrcore.contact.normal.gap import group_end
+from wrcore.contact.search.approach import LEVEL, pressed_together
+from wrcore.contact.search.detection import axle_direction, find_patches
+from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
+from wrcore.contact.search.strip import make_pose
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
+from wrcore.wheels.table.cells import FINER, FIRST, HARD, LEVELS, YAW, YAWS, corner_of, steps_of
+from wrcore.wheels.table.lookup import APART, FAR, SADDLE, lobe_end, log_depth_of
+from wrcore.wheels.table.store import _PAIRS, WRONG, Pair, pair_of
 
 LOOKED_UP, REFINED, SOLVED = "looked up", "refined", "solved"
 """What becomes of a cell."""

@@ -5,7 +5,7 @@ import pandas as pd
 
 from study.cost.recorded import evaluation, record
 from study.cost.timing import QUARTILES, take_turns
-from wrcore.dynamics.system import Equations
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.scene.description import compile_scene, load_scene
 
 

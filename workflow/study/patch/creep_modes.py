@@ -7,8 +7,8 @@ contacts between them, of four pairs of profiles. The remainder beside the creep
 or at those of a bent patch's parts, is fitted with quadratic B-splines, pose by pose. A node is solved for a few
 creepages: those from which, all poses together, least squares tell most of the rest of the remainder. The principal
 components of what they tell are the modes (a regression of reduced rank): of a family of contacts of little spin, and
-one of contacts of much (``FLANKS`` of `wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own.
-They come with the package (``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries,
+one of contacts of much (``FLANKS`` of `wrcore.wheels.table.lookup`). Each of some coefficients of friction has its own.
+They come with the package (``wrcore/wheels/table/tables/creep_modes.h5``) and serve all pairs: where one lobe carries,
 foreign modes are as good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were
 kept back, over mu N in %, by contact angle: median, 95 % and 99 %.
 
@@ -29,13 +29,13 @@ import numpy as np
 from study.patch.look_up_errors import PAIRS
 from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact.patch.model import MODES
-from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.creep_modes import SHIPPED, Modes, creep_modes, mode_weights
-from wrcore.dynamics.pair_cells import node_of
-from wrcore.dynamics.pair_solver import place_of, side_by_side
-from wrcore.dynamics.pair_store import pair_of
-from wrcore.dynamics.pair_table import NARROW, WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
+from wrcore.wheels.table import lookup as columns
+from wrcore.wheels.table.cells import node_of
+from wrcore.wheels.table.creep_modes import SHIPPED, Modes, creep_modes, mode_weights
+from wrcore.wheels.table.lookup import NARROW, WIDE
+from wrcore.wheels.table.solver import place_of, side_by_side
+from wrcore.wheels.table.store import pair_of
 
 SAMPLES, NEAR, CELLS, SOLUTIONS = 400, 150, 24, 20
 """Creepages of a pose all over the disk, and near none; cells of the splines across the disk; and solutions from which
@@ -74,7 +74,7 @@ def disk(n):
 
 
 def in_disk(points):
-    """Places (n, 2) in the disk of creepages, see `DISK` of `wrcore.dynamics.pair_table`."""
+    """Places (n, 2) in the disk of creepages, see `DISK` of `wrcore.wheels.table.lookup`."""
     return points / (columns.DISK + np.sqrt(columns.DISK**2 + (points**2).sum(axis=1)))[:, None]
 
 

@@ -13,9 +13,9 @@ from study.patch.tables import REFERENCE, radius_differences
 from study.style import shared_legend
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.analysis.pictures.style import MM, styled
-from wrcore.contact import reduction as columns
-from wrcore.contact.patch.library import ellipse_strips, make_library
 from wrcore.contact.patch.result import Patch
+from wrcore.contact.rolling.library import ellipse_strips, make_library
+from wrcore.contact.search import reduction as columns
 
 LINES = (
     {"color": "#CC79A7", "linestyle": "-", "linewidth": 0.8},

@@ -16,8 +16,8 @@ import wrcore as wr
 from study.patch.look_up import CURVE, ROUGH
 from study.patch.shipped_nodes import SHARP
 from wrcore.contact.patch.model import RESOLUTIONS
-from wrcore.dynamics import pair_store
-from wrcore.dynamics.pair_cells import LEVELS, corner_of
+from wrcore.wheels.table import store as pair_store
+from wrcore.wheels.table.cells import LEVELS, corner_of
 
 OTHER, SEED = {"contact.friction": 0.25}, {"track.irregularity.spectrum.seed": 5}
 SCENES = {

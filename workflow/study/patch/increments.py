@@ -12,7 +12,7 @@ import pandas as pd
 
 from study.patch.look_up_errors import FRICTION, PAIRS, SPEED
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.contact import reduction
+from wrcore.contact.search import reduction
 
 STEP, LOAD, DRIFT = 1e-6, 5e4, 1e-3
 

@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.contact import reduction
-from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics.pair_store import pair_of
-from wrcore.dynamics.wheel import SOLVED
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search import reduction
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
+from wrcore.wheels.hertzian_force import SOLVED
+from wrcore.wheels.table.store import pair_of
 
 SPEED, FRICTION = 20.0, 0.3
 

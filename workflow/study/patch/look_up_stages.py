@@ -16,21 +16,21 @@ import pandas as pd
 import wrcore as wr
 from study.cost.timing import Contender, take_turns
 from study.patch.look_up import SCENES
-from wrcore.contact.approach import LEVEL, pressed_together
-from wrcore.contact.strip import make_pose
-from wrcore.dynamics.lift import lift_of
-from wrcore.dynamics.modes import FRESH
-from wrcore.dynamics.motion import as_left, motion_of
-from wrcore.dynamics.pair_cells import LEFT
-from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end
-from wrcore.dynamics.strip_wheel import strip_wrenches
-from wrcore.dynamics.system import Equations
-from wrcore.dynamics.tabulated_wheel import lifted_place, look_only_lobe_up, roll_lobe
-from wrcore.dynamics.wheel import COUNTERS, detect_patches, wheel_wrenches
+from wrcore.contact.search.approach import LEVEL, pressed_together
+from wrcore.contact.search.strip import make_pose
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
 from wrcore.scene.description import compile_scene, load_scene
+from wrcore.wheels.exact_force import strip_wrenches
+from wrcore.wheels.hertzian_force import COUNTERS, detect_patches, wheel_wrenches
+from wrcore.wheels.modes import FRESH
+from wrcore.wheels.motion import as_left, motion_of
+from wrcore.wheels.normal_damping import lift_of
+from wrcore.wheels.table.cells import LEFT
+from wrcore.wheels.table.lookup import APART, FAR, SADDLE, lobe_end
+from wrcore.wheels.table_force import lifted_place, look_only_lobe_up, roll_lobe
 
 SEARCH, PLACE, NUMBERS, FORCE, SEAMS = range(5)
 STATES = 200

@@ -5,7 +5,7 @@ import math
 import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.contact import reduction as columns
+from wrcore.contact.search import reduction as columns
 
 LOAD = 1e3
 """Cases under smaller vertical loads are contacts of two points, N."""

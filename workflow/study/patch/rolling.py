@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.library import make_library
-from wrcore.contact.patch.rolling import AUTO, read_field, read_forces, rolling_force, rolling_work
+from wrcore.contact.rolling.library import make_library
+from wrcore.contact.rolling.rolling import AUTO, read_field, read_forces, rolling_force, rolling_work
 
 
 class RollingField(NamedTuple):

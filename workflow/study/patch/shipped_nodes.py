@@ -2,7 +2,7 @@
 
 Scenes run on an empty table, by `METHODS`: those of `study.patch.look_up`, and examples at speeds, on tracks and from
 starts that a user may well try. What they meet is kept, a group per pair of profiles: nodes, and which cells may be
-looked up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what
+looked up (``wrcore/wheels/table/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what
 they meet besides is added.
 """
 
@@ -15,9 +15,10 @@ import numpy as np
 
 import wrcore as wr
 from study.patch.look_up import ROUGH, SCENES
-from wrcore.dynamics import creep_modes, pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
 from wrcore.integrate.choice import CHOICES
+from wrcore.wheels.table import creep_modes
+from wrcore.wheels.table import store as pair_store
 
 WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
 NOTEBOOK = {"track.irregularity": {"spectrum": {"level": "low", "seed": 3, "length": 150.0, "begin": 15.0}}}

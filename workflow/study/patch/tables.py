@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.contact import reduction as columns
+from wrcore.contact.search import reduction as columns
 
 REFERENCE = "exact, fine"
 """What the other models are judged by."""

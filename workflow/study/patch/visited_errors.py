@@ -19,12 +19,12 @@ import pandas as pd
 import wrcore as wr
 from study.patch.look_up import CURVE, ROUGH
 from study.patch.look_up_errors import FRICTION, errors, worn
-from wrcore.contact import reduction
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, STRIPS
-from wrcore.dynamics.system import Equations
-from wrcore.dynamics.wheel import OUTSIDE_TRAINING, SOLVED
+from wrcore.contact.search import reduction
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene, load_scene
+from wrcore.wheels.hertzian_force import OUTSIDE_TRAINING, SOLVED
 
 
 def curved_track(radius, cant):

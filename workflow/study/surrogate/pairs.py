@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import list_profiles, named_profile

@@ -1,7 +1,7 @@
 """Contact patches at given positions: descriptors, exact solution, and what the network is to learn of it.
 
 The targets are defined by the product's own kernels, so that a network that meets them gives exact contact in
-`wrcore.dynamics.surrogate_wheel`:
+`wrcore.wheels.surrogate_force`:
 
 * Corrections (N_CORRECTIONS): ln N, ln a, ln b and ln p_max less those of the parabolic overlap; place along and
   across the patch over l, contact angle and height over l less those of the parabolas of `PatchShape` at the exact
@@ -18,17 +18,29 @@ import numpy as np
 
 from study.surrogate.finding import LIMITS, LOAD, LOG_A, LOG_B, P_MAX, PLACE, fill_base, find_described, first_touch
 from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.contact.normal.windows import MORE
 from wrcore.contact.patch.model import strip_work, with_tables
-from wrcore.contact.patch.windows import MORE
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS, PatchShape, parabola_at
 from wrcore.contact.surrogate.network import N_CORRECTIONS
 from wrcore.contact.surrogate.strips import new_strips
-from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS
-from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_node import (
+from wrcore.geometry.standards import named_profile
+from wrcore.kernels.handles import Handle
+from wrcore.wheels.hertzian_force import alone
+from wrcore.wheels.surrogate_force import (
+    _MOST_ANGLE,
+    _MOST_LOG_AXIS,
+    _MOST_LOG_LOAD,
+    _MOST_PLACE,
+    _MOST_WIDTH,
+    bounded,
+)
+from wrcore.wheels.table import lookup as columns
+from wrcore.wheels.table.lookup import DISK
+from wrcore.wheels.table.node import (
     AT_REST,
     NUMBERS,
     SLIPS,
@@ -39,18 +51,6 @@ from wrcore.dynamics.pair_node import (
     rolling_slip,
     slide,
 )
-from wrcore.dynamics.pair_table import DISK
-from wrcore.dynamics.surrogate_wheel import (
-    _MOST_ANGLE,
-    _MOST_LOG_AXIS,
-    _MOST_LOG_LOAD,
-    _MOST_PLACE,
-    _MOST_WIDTH,
-    bounded,
-)
-from wrcore.dynamics.wheel import alone
-from wrcore.geometry.standards import named_profile
-from wrcore.kernels.handles import Handle
 
 N_RANDOM = 12
 """Rolling solutions at random creepages, beside five near rest."""
@@ -107,7 +107,7 @@ def random_points(random, count=N_RANDOM):
 
 
 def unbounded(x, bound):
-    """Number that `wrcore.dynamics.surrogate_wheel.bounded` maps to x; beyond 0.95 of the bound to that."""
+    """Number that `wrcore.wheels.surrogate_force.bounded` maps to x; beyond 0.95 of the bound to that."""
     half = 0.5 * bound
     over = min(abs(x), 0.95 * bound) - half
     if not over > 0.0:

@@ -136,7 +136,7 @@ _OF_SHARD = "names", "distances", "failed"
 def _random_disk(n):
     """Places (n, POINTS, 2) of creepages for patches that are not solved."""
     from study.surrogate.solution import AT_REST, N_RANDOM, random_points
-    from wrcore.dynamics.pair_table import DISK
+    from wrcore.wheels.table.lookup import DISK
 
     random = np.random.default_rng(n)
     points = random_points(random, n * N_RANDOM).reshape(n, N_RANDOM, 2)

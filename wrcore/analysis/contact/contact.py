@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from wrcore.analysis.contact.contacts import contacts
 from wrcore.analysis.contact.poses import POSE_FLAGS, STILL
-from wrcore.contact.reduction import REDUCTIONS
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 

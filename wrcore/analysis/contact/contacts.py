@@ -11,18 +11,18 @@ from numpy.typing import ArrayLike
 
 from wrcore.analysis.contact.loaded import DEEPEST, LOWEST, SMOOTH, LoadedWheels
 from wrcore.analysis.contact.poses import ROLLING
-from wrcore.contact import reduction as columns
-from wrcore.contact.detection import axle_direction
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS, REDUCTIONS
-from wrcore.contact.statics import height_at_load, is_not_loaded, settle
-from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
-from wrcore.dynamics.motion import MOTION as _MOTION
-from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
+from wrcore.contact.rigid.height_at_load import height_at_load, is_not_loaded, settle
+from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+from wrcore.contact.search import reduction as columns
+from wrcore.contact.search.detection import axle_direction
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS, REDUCTIONS
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked, same_shape
 from wrcore.geometry.track import SIDES
 from wrcore.run.run import Channels
 from wrcore.run.validity import flags
+from wrcore.wheels.hertzian_force import COUNTERS, wheel_wrenches
+from wrcore.wheels.motion import MOTION as _MOTION
 
 MOTION: Any = _MOTION  # columns of motions
 OUT_OF_REACH = 1.0  # a wheelset that is lifted so much touches nothing, m

@@ -14,11 +14,10 @@ from typing import Annotated
 import numpy as np
 
 from wrcore.analysis.contact.loaded import GRIDS, Found, LoadedWheels
+from wrcore.contact.normal.strips import STEPS
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.patch.strips import STEPS
-from wrcore.contact.reduction import ANGLE, PENETRATION
-from wrcore.contact.statics import height_of_zero
-from wrcore.dynamics.motion import WheelMotion
+from wrcore.contact.rigid.height_at_load import height_of_zero
+from wrcore.contact.search.reduction import ANGLE, PENETRATION
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.errors.input_files import digest_of_all
@@ -27,6 +26,7 @@ from wrcore.kernels.cache import warn
 from wrcore.run.run import Run
 from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene, Source, friction_of, scene_of
+from wrcore.wheels.motion import WheelMotion
 
 PARTS = "vehicle", "wheel", "rail", "track", "contact"
 """Of a scene, on which contact hangs."""

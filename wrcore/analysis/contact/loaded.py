@@ -12,33 +12,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact import reduction as columns
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import DETECTIONS, axle_direction, find_patches
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import UR, U, frame_of_overlaps, group_end
+from wrcore.contact.hertz import contact_modulus, hertz_table
+from wrcore.contact.normal import solve
+from wrcore.contact.normal.gap import UR, U, frame_of_overlaps, group_end
+from wrcore.contact.normal.strips import STEPS
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.patch.rolling import read_field
-from wrcore.contact.patch.strips import STEPS
-from wrcore.contact.patch.surfaces import Motion, contact_plane
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
-from wrcore.contact.statics import ROLL_SLOPE, height_at_load, height_of_zero, settle
-from wrcore.contact.strip import make_pose
+from wrcore.contact.rigid.height_at_load import ROLL_SLOPE, height_at_load, height_of_zero, settle
+from wrcore.contact.rolling.rolling import read_field
+from wrcore.contact.search import reduction as columns
+from wrcore.contact.search.detection import DETECTIONS, axle_direction, find_patches
+from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
+from wrcore.contact.search.strip import make_pose
+from wrcore.contact.search.surfaces import Motion, contact_plane
 from wrcore.contact.surrogate.network import load_surrogate
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
-from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
-from wrcore.dynamics.patch_kernels import with_fallback, with_late
-from wrcore.dynamics.strip_wheel import group_wrench, mirror
-from wrcore.dynamics.surrogate_wheel import surrogate_wrenches
-from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
-from wrcore.dynamics.wheel import COUNTERS, ON_FIXED, ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.handles import Handle
+from wrcore.wheels.exact_force import group_wrench, mirror
+from wrcore.wheels.hertzian_force import COUNTERS, ON_FIXED, ON_GRID, ContactModel, wheel_wrenches
+from wrcore.wheels.kernels import with_fallback, with_late
+from wrcore.wheels.motion import MOTION, WheelMotion, as_left
+from wrcore.wheels.surrogate_force import surrogate_wrenches
+from wrcore.wheels.table_force import UNKNOWN, tabulated_wrench
 
 MODELS = (*PATCHES, "grid")
 

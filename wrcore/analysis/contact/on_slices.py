@@ -5,14 +5,14 @@ import math
 import numpy as np
 
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import CREST, GAP, SHAPE, TILT, frame_of_overlaps
-from wrcore.contact.patch.surfaces import ContactPlane, surface_gap
-from wrcore.contact.strip import make_pose
-from wrcore.dynamics.wheel import ON_FIXED, ON_GRID
+from wrcore.contact.normal import solve
+from wrcore.contact.normal.gap import CREST, GAP, SHAPE, TILT, frame_of_overlaps
+from wrcore.contact.search.strip import make_pose
+from wrcore.contact.search.surfaces import ContactPlane, surface_gap
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.run.shape_along import ROUGH
+from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID
 
 MODELS = ("maximum", "moment", "exact", "grid")
 """Patch models that serve rails which change along the track."""
@@ -30,9 +30,9 @@ class LoadedOnSlices(LoadedWheels):
     """`LoadedWheels` out of round or on rails of slices, both alike: of a `WheelOnSlices`; arguments as there.
 
     ``s`` (m) is the arc length of the wheelset's cross-section, ``turned`` (rad) the angle by which it has rolled. The
-    rail is what a wheel sees of it in its pose (`wrcore.contact.seen_rail`). Strips know parabolas along the track, a
-    grid knows the surfaces: where these differ by more than `ROUGH` within a patch a grid takes over, and goes on until
-    the wheel is laid elsewhere, so that a search for a height does not step to and fro."""
+    rail is what a wheel sees of it in its pose (`wrcore.contact.changing_rails.sections`). Strips know parabolas along
+    the track, a grid knows the surfaces: where these differ by more than `ROUGH` within a patch a grid takes over, and
+    goes on until the wheel is laid elsewhere, so that a search for a height does not step to and fro."""
 
     refines = False
 

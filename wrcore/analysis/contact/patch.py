@@ -10,7 +10,7 @@ from wrcore.analysis.contact.loaded import GRIDS, LoadedWheels, Rolling
 from wrcore.analysis.contact.poses import pose_flags
 from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES

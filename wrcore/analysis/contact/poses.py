@@ -7,9 +7,9 @@ import pandas as pd
 
 from wrcore.analysis.contact.loaded import SMOOTH, LoadedWheels, Rolling, carried
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
-from wrcore.contact import reduction as columns
-from wrcore.contact.seen_rail import WheelOnSlices
-from wrcore.contact.statics import is_not_loaded
+from wrcore.contact.changing_rails.sections import WheelOnSlices
+from wrcore.contact.rigid.height_at_load import is_not_loaded
+from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
 from wrcore.run.validity import FLAGS, flags
@@ -29,7 +29,8 @@ def loaded_poses(
     poses, geometry, wheel_load, patch="moment", resolution="fine", slip="surfaces", load_by="vertical", friction=0.3,
     detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28,
 ):  # fmt: skip
-    """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.pose_file.read_poses`: columns
+    """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.rigid.pose_file.read_poses`:
+    columns
     FIELDS, a row per patch, none without contact or equilibrium; ``attrs``: patches solved ``on_grid`` instead of
     strips, and ``on_fixed_strips``, whose tips were not found; wheels ``without_height`` that no height loads.
 

@@ -5,8 +5,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, plain, styled
-from wrcore.contact.first_touch import first_touch
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.first_touch import first_touch
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
 

@@ -8,7 +8,7 @@ from matplotlib.patches import Polygon
 
 from wrcore.analysis.contact.patch import pair_of, patch
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES

@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from wrcore.analysis.pictures.style import ACCENT, plain, styled
-from wrcore.elements.kind import ends_of
-from wrcore.elements.kinds import KINDS
+from wrcore.forces.kind import ends_of
+from wrcore.forces.kinds import KINDS
 from wrcore.vehicle.layout import FRAME_NAME
 
 MARKS = {name: kind.mark for name, kind in KINDS.items()} | {

@@ -13,9 +13,9 @@ from wrcore.analysis.response.frequency_response import observable
 from wrcore.analysis.stability.stability import rising, straight_ahead
 from wrcore.balance.curve import Curve, CurveBalance, Turning, at_rest, solve_curve
 from wrcore.balance.initial import LARGEST_REST_ON_STRIPS
-from wrcore.contact.reduction import CHANNELS
-from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY, angles
-from wrcore.dynamics.marker import FRAME
+from wrcore.bodies.body import EULER, STATE_SIZE, VELOCITY, angles
+from wrcore.bodies.marker import FRAME
+from wrcore.contact.search.reduction import CHANNELS
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.path_pieces import CANT_BASE

@@ -19,18 +19,18 @@ from numpy.typing import ArrayLike
 
 from wrcore.analysis.stability.stability import growth, rising, steady_motion
 from wrcore.balance.linear import Linearisation, accelerations, moved_states
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.inertia import inertia_tensors
-from wrcore.dynamics.system import Model, internal_states
-from wrcore.dynamics.track import TrackModel
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.inertia import inertia_tensors
+from wrcore.equations.equations_of_motion import Model, internal_states
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import Within, checked
+from wrcore.forces.drive import undriven
 from wrcore.geometry.irregularity import CHANNELS, MEANS, IrregularityData, combine
 from wrcore.geometry.path import tangent_path
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.simulation import Simulation, evaluated
 from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
+from wrcore.track.track import TrackModel
 
 FORCES = ("Fx_N", "Fy_N", "Fz_N", "Mx_Nm", "My_Nm", "Mz_Nm")
 """Forces at a body's centre of mass and moments about it, in the order of its coordinates."""

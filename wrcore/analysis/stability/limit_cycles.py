@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.stability.stability import at_speed, rising, straight_ahead
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.bodies.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate

@@ -28,9 +28,9 @@ import numpy as np
 import pandas as pd
 
 from wrcore.balance.linear import DIRECTIONS
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.flexible_track import RAILS, rigid_track, track_size
-from wrcore.dynamics.inertia import inertia_tensors
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.inertia import inertia_tensors
+from wrcore.track.flexible_track import RAILS, rigid_track, track_size
 
 NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change
 OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
@@ -44,7 +44,7 @@ Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
 
 TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
 TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
-"""Which of `TRACK` each freedom of a :class:`wrcore.dynamics.flexible_track.FlexibleTrack` belongs to."""
+"""Which of `TRACK` each freedom of a :class:`wrcore.track.flexible_track.FlexibleTrack` belongs to."""
 
 
 def families(vehicle):

@@ -11,14 +11,14 @@ from scipy.optimize import brentq
 
 from wrcore.analysis.stability.modes import NEUTRAL, energy_table, linear_modes, shape_table
 from wrcore.balance.linear import steady_running
-from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.track import TrackModel
+from wrcore.bodies.body import STATE_SIZE, matrix_of
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import checked
+from wrcore.forces.drive import undriven
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import tangent_path
 from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
+from wrcore.track.track import TrackModel
 
 LARGEST_REST = 1e-3
 """Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which

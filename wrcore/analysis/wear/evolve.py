@@ -31,8 +31,8 @@ from wrcore.analysis.wear.local_wear import BIN, check_motion, law_on_cells, loc
 from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear.wear_laws import check_friction, wear_law
 from wrcore.analysis.wear.worn_profiles import file_of, points_of, read_points, write_points
-from wrcore.contact.conicity import conicity_curve
-from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+from wrcore.contact.rigid.conicity import conicity_curve
+from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_yaml import read_source, validate

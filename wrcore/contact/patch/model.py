@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.library import LOG_MIN, LOG_STEP, Library, make_library
-from wrcore.contact.patch.normal_influence import influence_table
-from wrcore.contact.patch.panels import make_panels
-from wrcore.contact.patch.rolling import LEVELS, Level, RollingWork, rolling_work
-from wrcore.contact.patch.solve import STRIP_ROWS, SUMS
-from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, NormalWork, normal_work
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.normal.influence import influence_table
+from wrcore.contact.normal.solve import STRIP_ROWS, SUMS
+from wrcore.contact.normal.strips import MAX_STRIPS, MEMORY, NormalWork, normal_work
+from wrcore.contact.rolling.library import LOG_MIN, LOG_STEP, Library, make_library
+from wrcore.contact.rolling.panels import make_panels
+from wrcore.contact.rolling.rolling import LEVELS, Level, RollingWork, rolling_work
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.surrogate.network import no_surrogate
 from wrcore.contact.surrogate.scratch import SurrogateScratch, surrogate_scratch
 from wrcore.errors import InputError, one_of
@@ -27,7 +27,7 @@ SLIPS = ("surfaces", "creepages")
 
 
 class PairTable(NamedTuple):
-    """Exact contact of a wheel on its rail at the nodes of lattices, see `wrcore.dynamics.pair_table`; empty where it
+    """Exact contact of a wheel on its rail at the nodes of lattices, see `wrcore.wheels.table.lookup`; empty where it
     is not looked up."""
 
     keys: np.ndarray
@@ -52,8 +52,8 @@ NODES, NUMBERS, MODES = 48, 72, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
 LOBE_COLUMNS, SHARES = 10 + 2 * MAX_PATCHES, (12, 15)
-"""Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`, and of the cells that have a share in it, see
-`wrcore.dynamics.pair_cells`."""
+"""Of a lobe that is looked up, see `wrcore.wheels.table.coupled_lobes`, and of the cells that have a share in it, see
+`wrcore.wheels.table.cells`."""
 
 
 KERNEL, MODEL, ELLIPSES, LOBES, LOAD = range(5)
@@ -98,7 +98,7 @@ class StripWork(NamedTuple):
     spare: np.ndarray
     """(MEMORY,): a memory of nothing, once its first number is 0; solutions are written into it."""
     flags: np.ndarray
-    """(3,): what is asked of patches, see `wrcore.dynamics.strip_wheel`."""
+    """(3,): what is asked of patches, see `wrcore.wheels.exact_force`."""
     rows: np.ndarray
     out: np.ndarray
     strips: np.ndarray
@@ -119,9 +119,9 @@ class StripWork(NamedTuple):
     along: np.ndarray
     rest: np.ndarray
     lattice: np.ndarray
-    """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): of its slopes, see `wrcore.dynamics.lobe_slopes`."""
+    """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): of its slopes, see `wrcore.jacobian.table_wheel`."""
     moments: np.ndarray
-    """(3, 5): of overlaps, see `wrcore.contact.moved.slopes_of_square`."""
+    """(3, 5): of overlaps, see `wrcore.contact.search.moved.slopes_of_square`."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork

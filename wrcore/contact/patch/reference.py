@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.normal import contact_modulus
-from wrcore.contact.patch.grid import grid_normal, grid_rolling
+from wrcore.contact.grid.grid import grid_normal, grid_rolling
+from wrcore.contact.hertz import contact_modulus
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.patch.surfaces import Motion, plane_slip, strip_planes, surface_slip
+from wrcore.contact.search.surfaces import Motion, plane_slip, strip_planes, surface_slip
 from wrcore.errors import InputError
 
 FINE = ((40, 32), (48, 40), (56, 48), (64, 48))

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.geometry import LANES
+from wrcore.contact.search.geometry import LANES
 from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
 

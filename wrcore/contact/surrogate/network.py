@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.geometry import LANES
+from wrcore.contact.search.geometry import LANES
 from wrcore.contact.surrogate.descriptors import N_DESCRIPTORS
 from wrcore.kernels import lanes
 from wrcore.kernels.jit import FAST, FUSED, jit

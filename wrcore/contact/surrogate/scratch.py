@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.half_space_coupling import Ellipse
-from wrcore.contact.reduction import MAX_PATCHES
+from wrcore.contact.search.reduction import MAX_PATCHES
 from wrcore.contact.surrogate.network import SurrogateWork, surrogate_work
 from wrcore.contact.surrogate.strips import Strips, new_strips
 
@@ -40,7 +40,7 @@ class SurrogateScratch(NamedTuple):
     forces: PatchForces
     numbers: np.ndarray
     """(7, 9 + outputs of the network): of one patch after moves of its wheel, for
-    :mod:`wrcore.dynamics.surrogate_slopes`."""
+    :mod:`wrcore.jacobian.surrogate_wheel`."""
 
 
 def surrogate_scratch(surrogate):

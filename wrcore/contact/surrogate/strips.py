@@ -1,8 +1,8 @@
 """Strips of the wheel across one contact patch, and what the surrogate needs to know of each.
 
 The strips stand at nodes of the wheel profile: at every fourth one on a tread
-(:func:`wrcore.contact.moved.smooth_nodes`). Where these are more than `ENOUGH`, only every second or every fourth of
-them has a strip; 32 or more are then left.
+(:func:`wrcore.contact.search.moved.smooth_nodes`). Where these are more than `ENOUGH`, only every second or every
+fourth of them has a strip; 32 or more are then left.
 """
 
 import math
@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.approach import Pressed
-from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS
-from wrcore.contact.moved import STEEP, smooth_nodes
-from wrcore.contact.reduction import BEYOND, OUTSIDE
-from wrcore.contact.scan import leaves_cells
-from wrcore.contact.strip import (
+from wrcore.contact.search.approach import Pressed
+from wrcore.contact.search.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS
+from wrcore.contact.search.moved import STEEP, smooth_nodes
+from wrcore.contact.search.reduction import BEYOND, OUTSIDE
+from wrcore.contact.search.scan import leaves_cells
+from wrcore.contact.search.strip import (
     AHEAD,
     BEND,
     LIFT,

@@ -8,12 +8,12 @@ from study.cost.plain.forces import creep_force as plain_creep_force
 from study.cost.plain.forces import hertz
 from study.cost.plain.wheelset import plain_wheelset
 from tests.conftest import ELLIPTIC
-from wrcore.contact.normal import contact_modulus, hertz_shape
-from wrcore.contact.statics import settle
+from wrcore.bodies.body import euler_of, matrix_of
+from wrcore.contact.hertz import contact_modulus, hertz_shape
+from wrcore.contact.rigid.height_at_load import settle
 from wrcore.creep.laws import LAWS, creep_data, creep_force
 from wrcore.creep.table import ensure_table
-from wrcore.dynamics.body import euler_of, matrix_of
-from wrcore.dynamics.system import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
 from wrcore.integrate.integrator import integrate

@@ -1,0 +1,1 @@
+"""Rigid bodies, their joints, and the forces that joints need."""

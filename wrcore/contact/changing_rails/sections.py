@@ -1,0 +1,343 @@
+"""A rail that changes along the track, as a wheel in a pose sees it: one section, ready for every search and patch.
+
+At each lateral coordinate the gap between the wheel of revolution and the rail's surface z(x, y) is least at some x,
+ahead of the axle where the rail rises. The seen section has the height that gives a prismatic rail the same least gap,
+
+    f(y) = max_x (z_rail(x, y) - z_wheel(x, y)) + min_x z_wheel(x, y),
+
+which does not depend on the wheelset's height. What strips want beside it is kept at the section's nodes
+(`ContactGeometry.along`): how much further ahead the gap is least than over a prismatic rail, half of what the gap's
+second derivative over x has more, and how much higher the wheel's point there lies. Gap, place and curvature are those
+of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Where an overlap is of
+another length, its area counts. Over a rail that is the same everywhere the section is the rail's own and all three
+vanish.
+
+A wheel out of round is seen in the same way, see `wrcore.contact.changing_rails.out_of_round`.
+
+Where a head begins or ends under the wheel, its edge may be what is nearest; then the overlap that is there counts by
+its area. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrcore.contact.changing_rails.out_of_round import reach_beyond
+from wrcore.contact.search.detection import axle_direction
+from wrcore.contact.search.geometry import contact_geometry
+from wrcore.contact.search.strip import make_pose, strip_point
+from wrcore.contact.search.surfaces import ContactPlane, wheel_height
+from wrcore.geometry.profile import SPACING, ProfileCurve, averaged_second_derivative
+from wrcore.geometry.slices import RailSlices, WheelSlices
+from wrcore.geometry.track import SIDES
+from wrcore.kernels.jit import jit
+
+REACH, STEP, COARSE = 0.1, 1e-3, 4
+"""Half of the length along the track that is looked at, m: ramps up to 1:4.6 of a wheel of 460 mm; the distance of the
+sections there, m, and at every how many of them the wheel is first put."""
+
+WINDOW = 5.5e-3
+"""Half of the length over which the gap is fitted, m: of a cubic gap the parabola feels w^2/3, and a pressure
+sqrt(1 - (x/a)^2) feels 3 a^2/7, as much for patches of 9.7 mm."""
+
+USUAL_DEPTH, OTHER, ANOTHER = 6e-5, math.log(1.25), math.log(1.65)
+"""Depth (m) to which surfaces overlap under a wheel's usual load; and the ratio (logarithm) of that overlap's length to
+the fitted parabola's from which on its own area begins to count, and counts alone: on the chord of a fresh flat, say.
+"""
+
+BELOW = 0.03
+"""Depth below the section's lowest point at which what lies between its heads is put, m."""
+
+HEIGHT, AHEAD, BEND, LIFT = range(4)
+
+_CLOSE = 1e-9  # m
+
+
+@dataclass(frozen=True)
+class WheelOnSlices:
+    """A wheel on a rail of slices, or a wheel out of round.
+
+    Parameters
+    ----------
+    wheel : ProfileCurve
+        Of a wheel out of round the profile of a wheel of revolution near it.
+    rail : RailSlices
+        In the coordinates of the track: u from ``rail_distance``, f from the plane from which the wheelset's height
+        counts.
+    rolling_radius, half_distance, rail_distance : float
+        As for `WheelOnRail`, m.
+    out_of_round : WheelSlices, optional
+        Of both wheels alike.
+    """
+
+    wheel: ProfileCurve
+    rail: RailSlices
+    rolling_radius: float = 0.46
+    half_distance: float = 0.75
+    rail_distance: float = 0.75
+    out_of_round: WheelSlices | None = None
+
+    @cached_property
+    def geometry_of_wheel(self):
+        """Geometry of the wheel over a level rail: what the search for the seen section takes of it."""
+        u = SPACING * np.arange(-400, 401)
+        level = ProfileCurve("level", "rail", u, *np.zeros((3, u.size)))
+        sizes = self.rolling_radius, self.half_distance, self.rail_distance
+        return contact_geometry(self.wheel, level, *sizes)
+
+    def under(self, side, s, y, roll=0.0, yaw=0.0, turned=0.0):
+        """`ContactGeometry` of the section that the wheel of a ``side`` sees with the wheelset's centre at s, y (m), in
+        a roll and yaw (rad), ``turned`` (rad) forward, and the height (m) of the centre at which it first touches; None
+        and NaN where there is no rail under the wheel."""
+        sign, wheel = SIDES[side], self.geometry_of_wheel
+        pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
+        low, high = (strip_point(wheel, pose, u)[0] for u in self._ends)
+        u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
+        seen, touch, x, rail = self._seen(pose, s, u, turned)
+        there = np.isfinite(seen[HEIGHT])
+        if there.sum() < 10:
+            return None, math.nan
+        f, slope = filled(seen[HEIGHT], SPACING, np.min(seen[HEIGHT], where=there, initial=np.inf) - BELOW)
+        curve = ProfileCurve(f"{self.rail.name} at s = {s:g} m", "rail", u, f, slope,
+                             averaged_second_derivative(u, f, slope))  # fmt: skip
+        geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
+        over = np.where(np.isfinite(rail), rail - f, -BELOW)
+        level = self.out_of_round is not None and self.rail.s.size == 1
+        along = np.column_stack([*seen[AHEAD:], np.zeros(u.size) if level else seen[AHEAD], np.ones(u.size)])
+        return geometry._replace(along=along, over=np.column_stack([x, over])), touch
+
+    def straight(self, s, u):
+        """Sections (n, 4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees
+        with its cross-section at s (n,), multiples of `STEP` apart, m: rows `HEIGHT`, NaN where there is none, to
+        `LIFT`."""
+        pose, seen = make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), np.zeros((s.size, 4, u.size))
+        count = 2 * round(REACH / STEP) + 1
+        every = self._where_parts_begin(s[0] - REACH + STEP * np.arange(round((s[-1] - s[0]) / STEP) + count))
+        rail = self.rail.heights(every, u)[0]
+        for at, section in zip(s, seen, strict=True):
+            x, first = self._stations(at), round((at - s[0]) / STEP)
+            heights = rail[first : first + count]
+            if abs(at + x[0] - every[first]) > _CLOSE:  # another part begins nearby
+                heights = self.rail.heights(self._where_parts_begin(at + x), u)[0]
+            _see(self.geometry_of_wheel, pose, x, heights, np.zeros((0, 0)), u, section)
+        return seen
+
+    def turned(self, places, u, beyond):
+        """Sections (n, 4, m) over rail coordinates (m,) that the wheel of a wheelset in the middle sees of a level
+        rail at places (n,), where it reaches ``beyond(place, x, strips)``, (stations, m), its round, or the rail is as
+        much higher, at stations x and wheel coordinates ``strips``, m."""
+        geometry, pose, x = self.geometry_of_wheel, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
+        strips, seen = _strips_over(geometry, pose, u), np.zeros((places.size, 4, u.size))
+        for place, section in zip(places, seen, strict=True):
+            reach = beyond(place, x, strips)
+            _see(geometry, pose, x, reach, reach, u, section)
+        return seen
+
+    def strips(self, u):
+        """Of its strips over rail coordinates, for the same wheelset: 1/R (1/m), and what a small yaw (rad) moves their
+        points that touch ahead, less that of half the distance of the tape circles (m), (2, m)."""
+        at = u + self.rail_distance - self.half_distance
+        inside = np.clip(at, *self._ends)
+        radius = self.rolling_radius - self.wheel(inside)
+        return np.stack([1.0 / radius, at - radius * self.wheel(inside, 1)])
+
+    @property
+    def _ends(self):
+        return self.wheel.u[0], self.wheel.u[-1]
+
+    def _seen(self, pose, s, u, turned):
+        """Section (4, m) and height of the first touch in a pose of the wheel as a left one, turned forward (rad);
+        stations (n,) and heights of the rail (n, m) there, with what the wheel reaches beyond its round."""
+        x, beyond, seen = self._stations(s), np.zeros((0, 0)), np.zeros((4, u.size))
+        rail = self.rail.heights(self._where_parts_begin(s + x), u)[0]
+        if self.out_of_round is not None:
+            wheel = self.geometry_of_wheel
+            beyond = reach_beyond(self.out_of_round, wheel, pose, turned, x, _strips_over(wheel, pose, u))
+            rail = rail + beyond
+        return seen, _see(self.geometry_of_wheel, pose, x, rail, beyond, u, seen), x, rail
+
+    def _where_parts_begin(self, s):
+        """Arc lengths (n,), m, with those that miss the beginning of a part by rounding on it."""
+        for begin in self.rail.begins():
+            s = np.where(np.abs(s - begin) < _CLOSE, begin, s)
+        return s
+
+    def _stations(self, s):
+        """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
+        count = round(REACH / STEP)
+        begins = self.rail.begins() - s
+        begins = begins[np.abs(begins) < REACH]
+        shift = math.remainder(begins[np.argmin(np.abs(begins))], STEP) if begins.size else 0.0
+        return STEP * np.arange(-count, count + 1) + shift
+
+
+def filled(f, spacing, floor):
+    """Heights over evenly spaced lateral coordinates, with a ``floor`` where there is no rail (NaN) or only a shred of
+    it, and slopes by differences of the fourth order."""
+    heights, slope = np.full(f.size, floor), np.zeros(f.size)
+    ends = np.flatnonzero(np.diff(np.isfinite(f).astype(int), prepend=0, append=0)).reshape(-1, 2)
+    for first, last in ends:
+        part = f[first:last]
+        if part.size < 5:
+            continue
+        d = np.gradient(part, spacing, edge_order=2)
+        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * spacing)
+        heights[first:last], slope[first:last] = part, d
+    return heights, slope
+
+
+@jit
+def _strip_over(wheel, pose, u):
+    """Wheel coordinate of the strip whose extreme point lies over the rail coordinate ``u``, and that point's x and
+    height (m)."""
+    w = u
+    for _ in range(12):
+        ur, z, radius, _, _, along = strip_point(wheel, pose, w)
+        if abs(u - ur) < 1e-12:
+            break
+        w += u - ur
+    return w, radius * along * pose.q + (wheel.half_distance + w) * pose.ex, z
+
+
+@jit
+def _strips_over(wheel, pose, u):
+    """Wheel coordinates of the strips over rail coordinates, m."""
+    found = np.empty(u.size)
+    for k in range(u.size):
+        found[k] = _strip_over(wheel, pose, u[k])[0]
+    return found
+
+
+@jit(allocates=False)
+def _parabola(x, g, best):
+    """Vertex, height and second derivative of the parabola that fits best around its own vertex, with the weight
+    (1 - (d/WINDOW)^2)^2 at a distance d: smooth in what is fitted. From the highest station; NaN at an end."""
+    n, h = x.size, x[1] - x[0]
+    centre, top, second = x[best], np.nan, np.nan
+    if best < 1 or best > n - 2 or not g[best - 1] + g[best + 1] == g[best - 1] + g[best + 1]:
+        return centre, top, second
+    reach = int(WINDOW / h) + 1
+    for _ in range(12):
+        s0 = s1 = s2 = s3 = s4 = t0 = t1 = t2 = 0.0
+        middle = int(round((centre - x[0]) / h))
+        for direction in (-1, 1):
+            i = middle if direction > 0 else middle - 1
+            while 0 <= i < n and abs(i - middle) <= reach and g[i] == g[i]:
+                d = (x[i] - centre) / WINDOW
+                if abs(d) < 1.0:
+                    w = (1.0 - d * d) ** 2
+                    s0, s1, s2, s3, s4 = s0 + w, s1 + w * d, s2 + w * d**2, s3 + w * d**3, s4 + w * d**4
+                    v = w * (g[i] - g[best])
+                    t0, t1, t2 = t0 + v, t1 + v * d, t2 + v * d * d
+                i += direction
+        m00, m01, m02 = s2 * s4 - s3 * s3, s3 * s2 - s1 * s4, s1 * s3 - s2 * s2
+        whole = s0 * m00 + s1 * m01 + s2 * m02
+        c1 = (t0 * m01 + t1 * (s0 * s4 - s2 * s2) + t2 * (s1 * s2 - s0 * s3)) / whole
+        c2 = (t0 * m02 + t1 * (s1 * s2 - s0 * s3) + t2 * (s0 * s2 - s1 * s1)) / whole
+        if not c2 < 0.0:
+            return x[best], np.nan, np.nan
+        c0 = (t0 - s1 * c1 - s2 * c2) / s0
+        step = -0.5 * c1 / c2
+        centre, top, second = centre + WINDOW * step, g[best] + c0 - 0.25 * c1 * c1 / c2, 2.0 * c2 / WINDOW**2
+        if not abs(centre - x[best]) < WINDOW:  # an edge, or noise
+            return x[best], np.nan, np.nan
+        if abs(step) < 1e-10:
+            break
+    return centre, top, second
+
+
+@jit(allocates=False)
+def _usual_overlap(x, g, best, floor, low, high):
+    """Area (m^2) by which the gap is closed beyond a height ``floor``, from the station ``best`` on both ways within
+    those from ``low`` to ``high``, the middle of that area (m), and whether it ends there."""
+    area, moment, ends = 0.0, 0.0, True
+    for way in (-1, 1):
+        i = best
+        while g[i] > floor:
+            if not (low <= i + way <= high and g[i + way] == g[i + way]):
+                ends = ends and low <= i + way <= high
+                break
+            here, there = g[i] - floor, max(g[i + way] - floor, 0.0)
+            length = (x[i + way] - x[i]) * (1.0 if there > 0.0 else here / (g[i] - g[i + way]))
+            area += 0.5 * abs(length) * (here + there)
+            moment += abs(length) * (0.5 * x[i] * (here + there) + length * (here + 2.0 * there) / 6.0)
+            i += way
+    return area, moment / area, ends
+
+
+@jit(allocates=False)
+def _of_area(place, second, area, middle):
+    """Vertex and second derivative of a parabola, or, where the overlap of the usual depth is another one, of the
+    parabola of its ``area`` (m^2) about its ``middle`` (m)."""
+    if not area > 0.0:
+        return place, second
+    half = 0.75 * area / USUAL_DEPTH
+    part = (abs(math.log(half * math.sqrt(-0.5 * second / USUAL_DEPTH))) - OTHER) / (ANOTHER - OTHER)
+    if not part > 0.0:
+        return place, second
+    part = min(part, 1.0) ** 2 * (3.0 - 2.0 * min(part, 1.0))
+    return place + part * (middle - place), second - part * (second + 2.0 * USUAL_DEPTH / (half * half))
+
+
+@jit(allocates=False)
+def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
+    """Fill ``g`` with the height of the rail less that of the wheel at every ``step``-th station, NaN where one of them
+    is missing; returns the highest one, or -1."""
+    best = -1
+    for i in range(first, end, step):
+        g[i] = np.nan
+        if rail[i] == rail[i]:
+            n = wheel_height(wheel, pose, plane, x[i], 0.0, guess)
+            if n == n:
+                g[i], guess = rail[i] - n - plane.z, n
+                if best < 0 or g[i] > g[best]:
+                    best = i
+    return best
+
+
+@jit
+def _see(wheel, pose, x, rail, beyond, u, seen):
+    """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,), and what of
+    them is the wheel reaching ``beyond`` its round (n, m; empty: nothing); returns the height of the wheelset's centre
+    at the first touch. Stations are evenly apart."""
+    n, h, touch = x.size, x[1] - x[0], np.nan
+    g, nominal, near = np.full(n, np.nan), -wheel.rolling_radius, 2 * int(WINDOW / h) + COARSE
+    for k in range(u.size):
+        seen[HEIGHT, k] = np.nan
+        _, crest, lowest = _strip_over(wheel, pose, u[k])
+        plane = ContactPlane(0.0, u[k] + wheel.rail_distance, nominal, 1.0, 0.0)
+        guess = lowest - nominal
+        best = _fill(wheel, pose, plane, x, rail[:, k], 0, n, COARSE, guess, g)
+        if best < 0:
+            continue
+        low, high = max(best - near, 0), min(best + near, n - 1)
+        _fill(wheel, pose, plane, x, rail[:, k], low, high + 1, 1, guess, g)
+        for i in range(max(best - COARSE, 0), min(best + COARSE + 1, n)):
+            if g[i] > g[best]:
+                best = i
+        ahead = wheel_height(wheel, pose, plane, crest + WINDOW / 3.0, 0.0, guess)
+        behind = wheel_height(wheel, pose, plane, crest - WINDOW / 3.0, 0.0, guess)
+        own = 4.5 * (ahead + behind - 2.0 * guess) / WINDOW**2
+        top = g[best]
+        place, height, second = _parabola(x, g, best)
+        if not height == height:
+            height, second = top, -2.0 * own
+        else:
+            top = max(top, height)
+        area, middle, ends = _usual_overlap(x, g, best, top - USUAL_DEPTH, low, high)
+        if not ends:
+            _fill(wheel, pose, plane, x, rail[:, k], 0, n, 1, guess, g)
+            area, middle, _ = _usual_overlap(x, g, best, top - USUAL_DEPTH, 0, n - 1)
+        place, second = _of_area(place, second, area, middle)
+        wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
+        if len(beyond):
+            at = (place - x[0]) / h
+            i = min(max(int(at), 0), n - 2)
+            wheel_there -= beyond[i, k] + (at - i) * (beyond[i + 1, k] - beyond[i, k])
+        seen[HEIGHT, k], seen[AHEAD, k] = height + lowest, place - crest
+        seen[BEND, k], seen[LIFT, k] = -0.5 * second - own, wheel_there + nominal - lowest
+        if not touch >= top:
+            touch = top
+    return touch

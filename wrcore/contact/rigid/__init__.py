@@ -1,0 +1,1 @@
+"""Contact without elasticity: first touch, conicity, heights at a load."""

@@ -1,0 +1,1 @@
+"""Friction in a patch that rolls: by strips, and on ellipses."""

@@ -1,0 +1,1 @@
+"""Where wheel and rail overlap, and the overlaps' depth, place and curvature."""

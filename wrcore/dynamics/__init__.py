@@ -1,1 +1,0 @@
-"""Rigid bodies, joints, force elements and time integration."""

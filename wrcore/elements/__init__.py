@@ -1,1 +1,0 @@
-"""Force elements: one file per kind in `wrcore.elements.kinds`, with all that the core knows of it."""

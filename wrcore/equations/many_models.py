@@ -1,0 +1,83 @@
+"""Equations of motion for many runs, one after the other: kernels are looked up and scratch arrays allocated once."""
+
+import threading
+
+import numpy as np
+
+from wrcore.equations.equations_of_motion import Equations, internal_states, looked_up, with_wheels, workspace
+from wrcore.forces.control import with_control_laws
+from wrcore.forces.law import LAW
+from wrcore.forces.suspension import with_laws
+from wrcore.kernels.handles import Kind, values_of
+from wrcore.wheels.hertzian_force import shaped
+
+
+def equations_of(model, shared=None):
+    """Equations of motion, as if new, that each thread turns from one model to the next; ``shared`` keeps them for the
+    next call, which takes them away."""
+    if shared is None:
+        return Equations(model)
+    thread = "equations", threading.get_ident()
+    last, equations, scratch = shared.get(thread, (None, None, ()))
+    if model is not last:
+        key = *thread, *structure(model)
+        if key not in shared:
+            equations, new = Equations(model), workspace(model)
+            shared[key] = equations, list(zip(_arrays(equations.work), _arrays(new), strict=True))
+        else:
+            equations, scratch = shared[key]
+            equations.turn_to(with_kernels_of(model, equations.arguments[1].value))
+        shared[thread] = model, *shared[key]
+    for array, values in scratch:
+        array[...] = values
+    return equations
+
+
+def structure(model):
+    """What kernels are compiled and scratch arrays allocated for; models of equal structure can take turns in both."""
+    contact, strips = model.contact, model.contact.strips
+    sizes = tuple(array.shape for array in _arrays(strips)) if strips.strips else ()
+    return (
+        Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
+        len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
+        len(contact.surrogate.median), strips[:3], sizes, len(set(looked_up(model))), *model.controls.period,
+        *map(np.shape, model.controls), model.crossing.tables.shape, model.check_rails.rows.shape,
+    )  # fmt: skip
+
+
+def with_kernels_of(model, other):
+    """The model with the addresses of another one of the same structure, from
+    `wrcore.equations.equations_of_motion.with_kernels`."""
+    contact = model.contact
+    if contact.strips.strips:
+        contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
+    names = (
+        "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides", "guards",
+        "slopes",
+    )  # fmt: skip
+    kept = {name: getattr(other, name) for name in names}
+    contact = with_wheels(model._replace(contact=contact))
+    kept |= {"elements": _with_laws_of(model.elements, other.elements), "controls": with_control_laws(model.controls)}
+    return model._replace(contact=contact, **kept)
+
+
+def _with_laws_of(elements, other):
+    """The elements with the addresses of their laws, from others where these follow the same."""
+    if np.array_equal(elements.law[:, LAW], other.law[:, LAW]) and np.array_equal(elements.own, other.own):
+        return elements._replace(laws=other.laws, own_laws=other.own_laws)
+    return with_laws(elements)
+
+
+def _addresses(contact):
+    """Of the kernels of patches on strips, from a contact model that may have one for each wheel."""
+    strips = (*values_of(contact.wheels), contact)[0].strips
+    return {"fallback": strips.fallback, "group": strips.group}
+
+
+def _arrays(part):
+    """All arrays of a tuple of arrays, tuples and numbers."""
+    if isinstance(part, np.ndarray):
+        yield part
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from _arrays(item)

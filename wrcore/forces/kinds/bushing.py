@@ -1,0 +1,30 @@
+"""A spring_damper with cubic parts along and about all three axes."""
+
+import numpy as np
+
+from wrcore.forces import law
+from wrcore.forces.kind import Along, Kind, about, three
+from wrcore.forces.kinds import spring_damper
+from wrcore.kernels.jit import FUSED, jit
+
+KEYS = spring_damper.KEYS | {
+    "cubic_stiffness": three("cubic stiffnesses in N/m^3"),
+    "rotation_cubic_stiffness": about("cubic stiffnesses in N m/rad^3"),
+}
+
+
+@jit(allocates=False, fastmath=FUSED)
+def cubic(elements, k, stretch, speed, inner, press):
+    """h x^3."""
+    stiffness = law.numbers(elements, k)[0]
+    return stiffness * stretch * stretch * stretch, 0.0, 0.25 * stiffness * stretch**4, 0.0
+
+
+def parts(item):
+    """Spring and rotation, and what is cubic along each axis."""
+    along = zip(np.eye(3), item.get("cubic_stiffness", ()), strict=False)
+    spring, turning = spring_damper.parts(item)
+    return [spring, turning, *(Along(spring.ends, cubic, axis, (value,)) for axis, value in along if value > 0.0)]
+
+
+KIND = Kind(KEYS, ("at",), {"marker": "h", "color": "#0072B2"}, parts, spring_damper.acts(KEYS), (cubic,))

@@ -1,0 +1,1 @@
+"""Derivatives of the equations of motion, and the elimination of their blocks."""

@@ -1,0 +1,401 @@
+"""The linear system of a Rosenbrock step: 1/(h gamma) - J, body by body.
+
+With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v; the internal states belong
+to no body. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body, and go
+first: q = (sigma - Q)^-1 (g + R v). Internal states that act on bodies alone go next, one number each. What is left has
+a block of 6 x 6 for each pair of bodies that elements or joints link. Internal states that act on one another, those of
+the track under a wheelset, stand there as bodies do, by up to six; its displacements, q' = v, go first, too. The blocks
+are eliminated in an order that creates few others (track, wheelsets, bogies, car body). All loops are written out,
+without a linear algebra library: a step is the same to the bit on every run.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.bodies.body import EULER, STATE_SIZE, VELOCITY
+from wrcore.bodies.vector import dot
+from wrcore.jacobian.links import (
+    internal_state_bodies,
+    internal_state_groups,
+    packed,
+    reached_bodies,
+    track_displacements,
+)
+from wrcore.jacobian.moving_axes import RATE
+from wrcore.kernels.jit import jit
+
+
+class Pattern(NamedTuple):
+    """Which blocks there are, and the order in which nodes, bodies and then internal states by up to six, are
+    eliminated. Unknowns have the numbers of the Jacobian's ``by_velocity``."""
+
+    first: np.ndarray  # (m,) int: first unknown of each node
+    width: np.ndarray  # (m,) int: number of its unknowns
+    displaced: np.ndarray  # (m,) int: first of the internal states whose rates these are, -1: none
+    order: np.ndarray  # (m,) int: nodes
+    place: np.ndarray
+    """(m, m) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
+    later_starts: np.ndarray  # (m + 1,) int
+    later: np.ndarray  # (p,) int: nodes linked to the k-th one of the order and eliminated later, later_starts[k] <= p
+    pairs: np.ndarray  # (q, 2) int: rows and columns of the Jacobian's own blocks
+    states: np.ndarray  # (s,) int: unknowns that act on bodies alone
+    state_starts: np.ndarray  # (s + 1,) int
+    state_bodies: np.ndarray  # (r,) int: bodies of the k-th one of these, state_starts[k] <= r
+
+
+class System(NamedTuple):
+    """The factorised system."""
+
+    pattern: Pattern
+    inverse: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 of positions and of rotations
+    carried: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 R of positions and of rotations
+    blocks: np.ndarray  # (b, 6, 6): on the diagonal the inverse, below it L, above it U
+    pivot: np.ndarray  # (s,): diagonal entries of internal states that act on bodies alone
+    force: np.ndarray  # (r, 6): column of such a state in the rows of its bodies
+    drive: np.ndarray  # (r, 6): row of such a state in the columns of its bodies
+    right: np.ndarray  # (m, 6): right-hand side, then velocities and internal states
+    shift: np.ndarray  # (n, 6): displacements that do not depend on the velocities sought
+    scratch: np.ndarray  # (6, 6)
+
+
+def plan_elimination(model):
+    """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
+    them."""
+    n, reached, linked = len(model.bodies.mass), reached_bodies(model), internal_state_bodies(model)
+    displaced = track_displacements(model)
+    pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
+    together = internal_state_groups(model)
+    for states in together:
+        packs: list[list[int]] = []
+        for state in sorted({*states} - {*displaced.values()}):
+            alike = packs and (state in displaced) == (packs[-1][0] in displaced)
+            if alike and len(packs[-1]) < 6 and state == packs[-1][-1] + 1:  # one after the other in the state vector
+                packs[-1].append(state)
+            else:
+                packs.append([state])
+        ends = [*linked[states[0]], *range(len(nodes), len(nodes) + len(packs))]
+        pairs |= {pair for pack in ends[-len(packs) :] for k in ends for pair in ((pack, k), (k, pack))}
+        nodes += [[6 * n + state for state in pack] for pack in packs]
+    alone = [state for state in range(len(linked)) if not any(state in states for states in together)]
+    m, order, later = len(nodes), [], []
+    left = {node: set() for node in range(m)}
+    for ends in [*pairs, *(linked[state] for state in alone)]:
+        for node in ends:
+            left[node] |= {*ends} - {node}
+    place = np.full((m, m), -1)
+    while left:
+        node = min(left, key=lambda k: (len(left[k]), k < n, k))
+        rest = left.pop(node)
+        order.append(node)
+        later.append(sorted(rest))
+        for other in rest:
+            left[other] = (left[other] | rest) - {other, node}
+    number = 0
+    for node, rest in zip(order, later, strict=True):
+        for i, j in [(node, node), *((node, k) for k in rest), *((k, node) for k in rest)]:
+            place[i, j] = number
+            number += 1
+
+    return Pattern(
+        *(np.array(items) for items in zip(*((node[0], len(node)) for node in nodes), strict=True)),
+        np.array([6 * n + displaced.get(node[0] - 6 * n, -1 - 6 * n) for node in nodes]), np.array(order), place,
+        *packed(later), np.array(sorted(pairs)),
+        6 * n + np.array(alone, np.int64), *packed([sorted(linked[state]) for state in alone]),
+    )  # fmt: skip
+
+
+def new_system(equations):
+    """Allocate the system of a model's equations."""
+    pattern, n = equations.planned(plan_elimination), len(equations.arguments[1].value.bodies.mass)
+    m, entries = len(pattern.order), len(pattern.state_bodies)
+    return System(
+        pattern, np.zeros((n, 2, 3, 3)), np.zeros((n, 2, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),
+        np.zeros(len(pattern.states)), np.zeros((entries, 6)), np.zeros((entries, 6)), np.zeros((m, 6)),
+        np.zeros((n, 6)), np.zeros((6, 6)),
+    )  # fmt: skip
+
+
+@jit(allocates=False)
+def _invert_rotation(a, out):
+    """Inverse of a matrix (3, 3) by its cofactors."""
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for column in range(3):
+            p, q = (column + 1) % 3, (column + 2) % 3
+            out[column, i] = a[j, p] * a[k, q] - a[j, q] * a[k, p]
+    scale = 1.0 / (a[0, 0] * out[0, 0] + a[0, 1] * out[1, 0] + a[0, 2] * out[2, 0])
+    for i in range(3):
+        for j in range(3):
+            out[i, j] *= scale
+
+
+@jit(allocates=False)
+def _invert_block(block, scratch):
+    """Replace a block by its inverse (Gauss and Jordan, pivots by rows); False if it is singular or not finite."""
+    for i in range(6):
+        for j in range(6):
+            scratch[i, j] = block[i, j]
+            block[i, j] = 1.0 if i == j else 0.0
+    for k in range(6):
+        pivot = k
+        for i in range(k + 1, 6):
+            if abs(scratch[i, k]) > abs(scratch[pivot, k]):
+                pivot = i
+        if not 0.0 < abs(scratch[pivot, k]) < np.inf:
+            return False
+        scale = 1.0 / scratch[pivot, k]
+        for j in range(6):
+            scratch[k, j], scratch[pivot, j] = scratch[pivot, j], scratch[k, j]
+            block[k, j], block[pivot, j] = block[pivot, j], block[k, j]
+        for j in range(6):
+            scratch[k, j] *= scale
+            block[k, j] *= scale
+        for i in range(6):
+            factor = scratch[i, k]
+            if i != k:
+                for j in range(6):
+                    scratch[i, j] -= factor * scratch[k, j]
+                    block[i, j] -= factor * block[k, j]
+    return True
+
+
+@jit(allocates=False)
+def _multiply_right(block, other, scratch):
+    """block = block @ other."""
+    for i in range(6):
+        for j in range(6):
+            scratch[i, j] = 0.0
+        for k in range(6):
+            factor = block[i, k]
+            for j in range(6):
+                scratch[i, j] += factor * other[k, j]
+    for i in range(6):
+        for j in range(6):
+            block[i, j] = scratch[i, j]
+
+
+@jit(allocates=False)
+def _subtract_product(target, left, right):
+    """target -= left @ right."""
+    for i in range(6):
+        for k in range(6):
+            factor = left[i, k]
+            for j in range(6):
+                target[i, j] -= factor * right[k, j]
+
+
+@jit(allocates=False)
+def _carry(jacobian, system, sigma):
+    """Eliminate the positions, u' = v - omega x u, the lengths of p, then the rotations."""
+    rate, share = jacobian.turn[RATE], 1.0 / (sigma - jacobian.length[0])
+    along, across = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
+    for b in range(system.carried.shape[0]):
+        for slide in (system.inverse[b, 0], system.carried[b, 0]):
+            slide[0, 0] = slide[1, 1] = along
+            slide[0, 1], slide[1, 0], slide[2, 2] = across, -across, 1.0 / sigma
+        turning, by_length = jacobian.turning[b], jacobian.spin[b]
+        inverse, carried = system.inverse[b, 1], system.carried[b, 1]
+        for i in range(3):
+            for j in range(3):
+                carried[i, j] = (sigma if i == j else 0.0) - turning[i, j] - share * by_length[i] * turning[3, j]
+        _invert_rotation(carried, inverse)
+        for i in range(3):
+            for j in range(3):
+                carried[i, j] = 0.0
+                for k in range(3):
+                    carried[i, j] += inverse[i, k] * (turning[k, 3 + j] + share * by_length[k] * turning[3, 3 + j])
+
+
+@jit(allocates=False, forceinline=True)
+def _fill(jacobian, system, first, count, j, block):
+    """Write the negative derivatives of some rows with respect to the velocities of body j, with what the displacements
+    that these bring about add."""
+    for part in range(2):
+        at, carried = 6 * j + 3 * part, system.carried[j, part]
+        x, y, z = jacobian.by_position[at], jacobian.by_position[at + 1], jacobian.by_position[at + 2]
+        for k in range(3):
+            known, by_x, by_y, by_z = jacobian.by_velocity[at + k], carried[0, k], carried[1, k], carried[2, k]
+            for row in range(count):
+                i = first + row
+                block[row, 3 * part + k] = -(known[i] + x[i] * by_x + y[i] * by_y + z[i] * by_z)
+
+
+@jit(allocates=False, forceinline=True)
+def _add_shift(jacobian, shift, first, count, j, to):
+    """Add what the displacements of body j that do not depend on the velocities sought bring about in some rows."""
+    for k in range(6):
+        column, share = jacobian.by_position[6 * j + k], shift[j, k]
+        for row in range(count):
+            to[row] += share * column[first + row]
+
+
+@jit(allocates=False)
+def factorise(jacobian, system, sigma):
+    """Assemble and factorise the system for sigma = 1/(h gamma); False if it is singular."""
+    pattern, blocks, bodies = system.pattern, system.blocks, system.carried.shape[0]
+    _carry(jacobian, system, sigma)
+    blocks[:] = 0.0
+    for q in range(pattern.pairs.shape[0]):
+        i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
+        block = blocks[pattern.place[i, j]]
+        if j >= bodies:
+            for column in range(pattern.width[j]):
+                for row in range(pattern.width[i]):
+                    block[row, column] = -jacobian.by_velocity[pattern.first[j] + column, pattern.first[i] + row]
+                    if pattern.displaced[j] >= 0:
+                        known = jacobian.by_velocity[pattern.displaced[j] + column, pattern.first[i] + row]
+                        block[row, column] -= known / sigma
+        elif i < bodies:
+            _fill(jacobian, system, 6 * i, 6, j, block)
+        else:
+            _fill(jacobian, system, pattern.first[i], pattern.width[i], j, block)
+    for node in range(pattern.order.shape[0]):
+        block = blocks[pattern.place[node, node]]
+        for k in range(6):
+            block[k, k] += sigma
+    for s in range(system.pivot.shape[0]):
+        state = pattern.states[s]
+        system.pivot[s] = sigma - jacobian.by_velocity[state, state]
+        first, last = pattern.state_starts[s], pattern.state_starts[s + 1]
+        for q in range(first, last):
+            body = pattern.state_bodies[q]
+            _fill(jacobian, system, state, 1, body, system.drive[q : q + 1])
+            for k in range(6):
+                system.force[q, k] = -jacobian.by_velocity[state, 6 * body + k]
+        for q in range(first, last):
+            for p in range(first, last):
+                block = blocks[pattern.place[pattern.state_bodies[q], pattern.state_bodies[p]]]
+                for i in range(6):
+                    factor = system.force[q, i] / system.pivot[s]
+                    for j in range(6):
+                        block[i, j] -= factor * system.drive[p, j]
+    return _eliminate(pattern, blocks, system.scratch)
+
+
+@jit(allocates=False)
+def _eliminate(pattern, blocks, scratch):
+    for k in range(pattern.order.shape[0]):
+        body = pattern.order[k]
+        pivot = blocks[pattern.place[body, body]]
+        if not _invert_block(pivot, scratch):
+            return False
+        first, last = pattern.later_starts[k], pattern.later_starts[k + 1]
+        for p in range(first, last):
+            i = pattern.later[p]
+            left = blocks[pattern.place[i, body]]
+            _multiply_right(left, pivot, scratch)
+            for q in range(first, last):
+                j = pattern.later[q]
+                _subtract_product(blocks[pattern.place[i, j]], left, blocks[pattern.place[body, j]])
+    return True
+
+
+@jit(allocates=False)
+def _substitute(system, unknowns):
+    """Solve for velocities and internal states, in ``system.right`` and, by their number, in ``unknowns``, in place."""
+    pattern, blocks, right = system.pattern, system.blocks, system.right
+    n = pattern.order.shape[0]
+    for s in range(system.pivot.shape[0]):
+        for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
+            to, share = right[pattern.state_bodies[q]], unknowns[pattern.states[s]] / system.pivot[s]
+            for k in range(6):
+                to[k] -= system.force[q, k] * share
+    for k in range(n):
+        body = pattern.order[k]
+        for p in range(pattern.later_starts[k], pattern.later_starts[k + 1]):
+            block, to = blocks[pattern.place[pattern.later[p], body]], right[pattern.later[p]]
+            for i in range(6):
+                for j in range(6):
+                    to[i] -= block[i, j] * right[body, j]
+    result = system.scratch[0]
+    for k in range(n - 1, -1, -1):
+        body = pattern.order[k]
+        at = right[body]
+        for p in range(pattern.later_starts[k], pattern.later_starts[k + 1]):
+            block, known = blocks[pattern.place[body, pattern.later[p]]], right[pattern.later[p]]
+            for i in range(6):
+                for j in range(6):
+                    at[i] -= block[i, j] * known[j]
+        block = blocks[pattern.place[body, body]]
+        for i in range(6):
+            total = 0.0
+            for j in range(6):
+                total += block[i, j] * at[j]
+            result[i] = total
+        for i in range(6):
+            at[i] = result[i]
+    for s in range(system.pivot.shape[0]):
+        total = unknowns[pattern.states[s]]
+        for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
+            for k in range(6):
+                total -= system.drive[q, k] * right[pattern.state_bodies[q], k]
+        unknowns[pattern.states[s]] = total / system.pivot[s]
+
+
+@jit(allocates=False)
+def solve_stage(jacobian, system, sigma, increment):
+    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place. Euler
+    parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
+    pattern, right, shift = system.pattern, system.right, system.shift
+    n = shift.shape[0]
+    unknowns = increment[(STATE_SIZE - 6) * n :]  # by their number
+    for b in range(n):
+        at, axes, inverse, to = STATE_SIZE * b, jacobian.axes[b], system.inverse[b], shift[b]
+        length = 0.0
+        for j in range(4):
+            length += axes[3, j] * increment[at + EULER + j]
+        length /= sigma - jacobian.length[0]
+        for i in range(6):
+            to[i], right[b, i] = 0.0, increment[at + VELOCITY + i]
+        for k in range(3):
+            turn = length * jacobian.spin[b, k]
+            for j in range(4):
+                turn += 2.0 * axes[k, j] * increment[at + EULER + j]
+            for i in range(3):
+                to[i] += inverse[0, i, k] * increment[at + k]
+                to[3 + i] += inverse[1, i, k] * turn
+    for node in range(n, right.shape[0]):
+        for k in range(6):  # beyond its width, too, where a stage that was not finite may have left its marks
+            right[node, k] = unknowns[pattern.first[node] + k] if k < pattern.width[node] else 0.0
+            if k < pattern.width[node] and pattern.displaced[node] >= 0:
+                unknowns[pattern.displaced[node] + k] /= sigma
+    for q in range(pattern.pairs.shape[0]):
+        i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
+        if j < n and i < n:
+            _add_shift(jacobian, shift, 6 * i, 6, j, right[i])
+        elif j < n:
+            _add_shift(jacobian, shift, pattern.first[i], pattern.width[i], j, right[i])
+        elif pattern.displaced[j] >= 0:
+            for k in range(pattern.width[j]):
+                column, share = jacobian.by_velocity[pattern.displaced[j] + k], unknowns[pattern.displaced[j] + k]
+                for row in range(pattern.width[i]):
+                    right[i, row] += share * column[pattern.first[i] + row]
+    for s in range(pattern.states.shape[0]):
+        state = pattern.states[s]
+        for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
+            _add_shift(jacobian, shift, state, 1, pattern.state_bodies[q], unknowns[state : state + 1])
+    _substitute(system, unknowns)
+    for node in range(n, right.shape[0]):
+        for k in range(pattern.width[node]):
+            unknowns[pattern.first[node] + k] = right[node, k]
+            if pattern.displaced[node] >= 0:
+                unknowns[pattern.displaced[node] + k] += right[node, k] / sigma
+    for b in range(n):
+        at, axes, turning = STATE_SIZE * b, jacobian.axes[b], jacobian.turning[b]
+        carried, to, velocity = system.carried[b], shift[b], right[b]
+        length = 0.0
+        for j in range(4):
+            length += axes[3, j] * increment[at + EULER + j]
+        for i in range(6):
+            increment[at + VELOCITY + i] = velocity[i]
+        for i in range(3):
+            increment[at + i] = to[i] + dot(carried[0, i], velocity)
+            for j in range(3):
+                to[3 + i] += carried[1, i, j] * velocity[3 + j]
+        for j in range(3):
+            length += turning[3, j] * to[3 + j] + turning[3, 3 + j] * velocity[3 + j]
+        for j in range(4):
+            increment[at + EULER + j] = axes[3, j] * length / (sigma - jacobian.length[0])
+            for i in range(3):
+                increment[at + EULER + j] += 0.5 * axes[i, j] * to[3 + i]

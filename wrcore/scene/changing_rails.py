@@ -1,0 +1,259 @@
+"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``, and what wheels see of them
+and of their own shapes.
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import pairwise
+
+import numpy as np
+
+from wrcore.contact.changing_rails.section_table import BLEND, SeenTable
+from wrcore.contact.changing_rails.sections import REACH
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.geometry.corrugation import Corrugation
+from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.joint import Joint
+from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.switch import Switch
+from wrcore.geometry.track import SIDES
+from wrcore.kernels.cache import warn
+from wrcore.kernels.told import warn_once
+from wrcore.scene.kept_tables import kept_shape, kept_table
+from wrcore.scene.pairs import find_file
+from wrcore.track.changing_rails import crossing_of, laid_along, laid_at, laid_under
+
+JOINED = 1e-4
+"""How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
+
+STEEPEST_ALONG = 0.2
+"""Slopes along the track that a wheel is laid on: what it touches lies within `REACH` of its axle."""
+
+RUNNING = -0.03, 0.01, -0.012
+"""Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
+
+SWING = 5e-4
+"""By how much a rail may leave the heights of the slices before and behind, m: more is told."""
+
+BENEATH, BELOW, CROWN = 0.08, -0.03, 3e-3
+"""Wheels find heads up to this lateral coordinate, no lower than this height, and run on so much of them, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaidCrossing:
+    """A stretch of track where rails change."""
+
+    rails: tuple
+    """`RailSlices` of the left and the right rail, in the coordinates of the plain ones; None where one is the same
+    everywhere."""
+    at: float
+    """Arc length of their s = 0, m."""
+    backwards: bool
+    """Whether their s counts against that of the track."""
+
+    @property
+    def ends(self):
+        """Arc lengths between which rails are not the plain ones, m."""
+        slices = next(rail for rail in self.rails if rail is not None)
+        low, high = slices.s[0] - REACH - BLEND, slices.s[-1] + REACH + BLEND
+        return (self.at - high, self.at - low) if self.backwards else (self.at + low, self.at + high)
+
+
+def read_crossings(data, vehicle, pairs, folder, source):
+    """`LaidCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
+    the schema; ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail
+    they join."""
+    specs, laid, known = data["track"].get("crossing", []), [], {}
+    for k, spec in enumerate([specs] if isinstance(specs, dict) else specs):
+        field = "track.crossing" if isinstance(specs, dict) else f"track.crossing.{k}"
+        what = json.dumps([spec["slices"], spec["rail"]], sort_keys=True)
+        if what not in known:
+            known[what] = _rails(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
+        crossing = known[what] and LaidCrossing(known[what], float(spec["at"]), spec["reversed"])
+        if crossing is not None:
+            _check_begin(crossing, vehicle, source, f"{field}.at")
+            laid.append((crossing, field))
+    for side, name in enumerate(SIDES):
+        along = sorted((one.ends, field) for one, field in laid if one.rails[side] is not None)
+        for ((low, high), _), ((begin, end), field) in pairwise(along):
+            if begin < high:
+                expected = f"expected stretches of the {name} rail apart, got {low:g} to {high:g} m and {begin:g} to"
+                raise InputError(source, f"{field}.at", f"{expected} {end:g} m")
+    return tuple(sorted((one for one, _ in laid), key=lambda one: one.ends))
+
+
+def _rails(spec, depth, pairs, folder, source, field):
+    """Rails of a `LaidCrossing`, None where they are plain."""
+    slices = _slices(spec["slices"], folder, source, f"{field}.slices")
+    sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
+    rails = [
+        slices.along(pair.rail, depth) if side in sides else None for side, pair in zip(SIDES, pairs, strict=False)
+    ]
+    for rail, pair in zip(rails, pairs, strict=False):
+        if rail is not None:
+            _check_joints(rail, pair.rail, source, f"{field}.slices")
+            _check_surface(rail, source, f"{field}.slices")
+            _warn_of_swings(rail, f"{source}: {field}.slices")
+    return None if slices.alike else tuple(rails)
+
+
+def _check_begin(crossing, vehicle, source, field):
+    """An InputError where a wheelset stands on it at the beginning."""
+    low, high = crossing.ends
+    for name, x in zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True):
+        if low < x < high:
+            expected = (
+                f"expected no wheelset on it at the beginning, got {name} at {x:g} m, it from {low:g} to {high:g} m"
+            )
+            raise InputError(source, field, expected)
+
+
+MADE = {
+    "crossing": (Crossing, 1.0 / 30.0, 1.0 / 5.0, "a crossing from 1/30 to 1/5, such as crossing:1/12"),
+    "switch": (Switch, 100.0, 5000.0, "a switch of 100 to 5000 m, such as switch:500"),
+    "joint": (Joint, 1e-4, 0.05, "a joint of 0.0001 to 0.05 rad, such as joint:0.01"),
+}
+"""Rails by a formula: their first dimension, within bounds, and what to say beyond these."""
+
+
+def _slices(spec, folder, source, field) -> RailSlices:
+    how = spec if isinstance(spec, dict) else {"slices": spec}
+    named = how.get("slices")
+    kind, colon, value = named.partition(":") if isinstance(named, str) else ("", "", "")
+    if colon and kind in MADE:
+        if others := sorted(map(str, how.keys() - {"slices"})):
+            raise InputError(source, f"{field}.{others[0]}", f"expected no such key beside {named}, made by a formula")
+        made, low, high, expected = MADE[kind]
+        if not low <= (size := parse_ratio(value)) <= high:
+            raise InputError(source, field, f"expected {expected}, got {spec!r}")
+        return made(size).rail(f"{kind}:{value}")
+    if not isinstance(named, str):
+        raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
+    path = find_file(named, folder, source, field)
+    return read_slices({**how, "slices": str(path)}, described_by=f"{source}: {field}")
+
+
+def _check_joints(slices, plain, source, field):
+    """An InputError where the first or the last slice is no continuation of the plain rail."""
+    low, high, depth = RUNNING
+    u = np.arange(low, high, 1e-3)
+    f, slope = plain(u), plain(u, 1)
+    for k, which in ((0, "first"), (-1, "last")):
+        off = np.abs(slices.heights(slices.s[k], u)[0, 0] - f) / np.sqrt(1.0 + slope**2)
+        off = np.where(f > depth, np.nan_to_num(off, nan=math.inf), 0.0)
+        worst = int(np.argmax(off))
+        if off[worst] > JOINED:
+            got = f"{1e3 * off[worst]:.3f} mm" if off[worst] < math.inf else "none"
+            expected = f"expected a {which} slice within {1e3 * JOINED:g} mm of the scene's rail {plain.name}"
+            raise InputError(source, field, f"{expected}, got {got} at u = {u[worst]:.3f} m")
+
+
+def _check_surface(slices, source, field):
+    """An InputError where a rail has no head under the wheels, or one that is too steep along the track."""
+    between = 0.5 * (slices.s[1:] + slices.s[:-1])
+    s, u = np.sort(np.concatenate([slices.s, between])), np.arange(RUNNING[0], BENEATH, 1e-3)
+    for part in np.array_split(s, math.ceil(s.size / 500)):
+        f, _, along = slices.heights(part, u)
+        top = np.max(f, axis=1, where=np.isfinite(f), initial=-np.inf)
+        if (gone := np.flatnonzero(top < BELOW)).size:
+            expected = f"expected a head under the wheels everywhere, got none at s = {part[gone[0]]:g} m"
+            raise InputError(source, field, expected)
+        steep = np.max(np.abs(along), axis=1, where=f > top[:, None] - CROWN, initial=0.0)
+        worst = int(np.argmax(steep))
+        if not steep[worst] < STEEPEST_ALONG:
+            expected = f"expected heads that rise less than {STEEPEST_ALONG:g} along the track"
+            raise InputError(source, field, f"{expected}, got {steep[worst]:.3g} at s = {part[worst]:g} m")
+
+
+def _warn_of_swings(slices, where):
+    """Say where the splines through the slices leave the heights of both neighbours; a notch between two heads, which
+    moves along, is none."""
+    u, worst = np.arange(RUNNING[0], RUNNING[1], 1e-3), (0.0, 0.0)
+    for part in np.array_split(np.arange(slices.s.size - 1), math.ceil(slices.s.size / 500)):
+        ends, middle = slices.s[[part, part + 1]], 0.5 * (slices.s[part] + slices.s[part + 1])
+        (low, high), f = (slices.heights(at, u)[0] for at in ends), slices.heights(middle, u)[0]
+        top = np.max(f, axis=1, where=np.isfinite(f), initial=-np.inf)
+        under = np.where(f > top[:, None] - CROWN, np.minimum(low, high) - f, 0.0)
+        out = np.maximum(under, f - np.maximum(low, high))
+        out = np.max(out, axis=1, where=np.isfinite(out) & (f > RUNNING[2]), initial=0.0)
+        worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
+    if worst[0] > SWING:
+        text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
+        warn_once(f"{where}: {text}: add slices there")
+
+
+def read_corrugation(data, crossings, shapes, source):
+    """`Corrugation` of a scene's content, None where its rails are smooth."""
+    spec = data["track"].get("corrugation")
+    if spec is None:
+        return None
+    sides = tuple(SIDES) if spec["rail"] == "both" else (spec["rail"],)
+    for k, side in enumerate(SIDES):
+        changes = any(crossing.rails[k] is not None for crossing in crossings)
+        if side in sides and (changes or any(shape for shape, _ in shapes[k::2])):
+            other = "track.crossing" if changes else "wheels out of round"
+            expected = f"expected no {other} on the {side} rail where it is corrugated"
+            raise InputError(source, "track.corrugation.rail", expected)
+    slope = 2.0 * math.pi * spec["amplitude"] / spec["wavelength"]
+    if not slope < STEEPEST_ALONG:
+        expected = f"expected a wave that rises less than {STEEPEST_ALONG:g}, got {slope:.3g}"
+        raise InputError(source, "track.corrugation.amplitude", expected)
+    return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
+
+
+def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
+    """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
+    and the `wrcore.track.changing_rails.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc
+    lengths (k,) at which wheelsets begin, m."""
+    known: dict[tuple, int] = {}
+    tables: list[SeenTable] = []
+    geometries, of_wheels = [], []
+
+    def number(pair, what, make, backwards=False):
+        """Of the table of what a pair's wheel sees, which is made once."""
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(what), backwards
+        if key not in known:
+            known[key] = len(tables)
+            tables.append(make())
+        return known[key]
+
+    for k, pair in enumerate(pairs):
+        laid = [crossing for crossing in crossings if crossing.rails[k % 2] is not None]
+        shape, angle = shapes[k] if shapes else (None, 0.0)
+        wave = corrugation if corrugation and list(SIDES)[k % 2] in corrugation.sides else None
+        passed = []
+        if laid:
+            wide = [crossing.rails[k % 2].lateral for crossing in laid]
+            lateral = min(low for low, _ in wide), max(high for _, high in wide)
+            for crossing in laid:
+                slices, back = crossing.rails[k % 2], crossing.backwards
+                table = number(pair, slices, partial(kept_table, pair, slices, back, lateral), back)
+                passed.append((table, laid_at(tables[table], tables[table].begin + crossing.at, pair.half_distance)))
+        elif shape is not None:
+            table = number(pair, shape, partial(kept_shape, pair, shape))
+            radius = 0.5 * (pairs[k - k % 2].rolling_radius + pairs[k + 1 - k % 2].rolling_radius)
+            passed.append((table, laid_under(tables[table], starts[k // 2], angle, radius, shape.shortest)))
+        elif wave is not None:
+            table = number(pair, wave, partial(kept_shape, pair, wave))
+            passed.append((table, laid_along(tables[table], wave, pair.half_distance)))
+        geometries.append(_on_plain_rail(pair, [tables[table] for table, _ in passed]))
+        of_wheels.append(passed)
+    return tuple(geometries), crossing_of(tables, of_wheels)
+
+
+def _on_plain_rail(pair, tables):
+    """`ContactGeometry` of a wheel that passes tables, whose bounds hold for all of them."""
+    if not tables:
+        return pair.geometry._replace(along=np.zeros((len(pair.geometry.rail), 5)))
+    errors = np.max([table.geometry.zone_planar_errors for table in tables], axis=0)
+    return tables[0].geometry._replace(zone_planar_errors=errors)
+
+
+@cache
+def warn_of_rigid_rails(source):
+    """Say, once, that impact on rails that do not give is no result."""
+    warn(f"{source}: impact on rigid rails is no result; track.support says how the track gives")

@@ -1,0 +1,1 @@
+"""What wheels run on: the track's moving frame, track that gives, check rails, rails that change along the track."""

@@ -1,0 +1,429 @@
+"""Wrench of the rails on a wheel by the surrogate of exact contact (:mod:`wrcore.contact.surrogate`).
+
+Nothing is solved and nothing is kept between evaluations. From a wheel's position to its contact forces:
+
+1. The search finds overlaps. Neighbours within 0.5 rad are one group, those of a group that lie near each other one
+   contact patch.
+2. The damping lifts the wheel (:mod:`wrcore.wheels.normal_damping`); so do the other patches of the same group of
+   overlaps.
+3. Strips across the patch give 38 descriptors, and these the network's outputs.
+4. `press_patch`: normal force, semi-axes, place and contact angle.
+5. `roll_patch`: creepages at that place, the creep table at that ellipse, and the remainder by the force modes.
+
+Every output is bounded, whatever the descriptors are: ln N beside that of a parabolic overlap, the place within the
+patch, the creep force by friction, its power by zero.
+"""
+
+import math
+from typing import NamedTuple
+
+from wrcore.bodies.vector import copy_into
+from wrcore.contact.creepage import creepages
+from wrcore.contact.half_space_coupling import ellipse_of, rise_by_pressure, slip_by_friction, write_ellipse
+from wrcore.contact.hertz import contact_modulus, hertz_shape_at
+from wrcore.contact.normal.gap import add_force, group_end
+from wrcore.contact.search import approach, reduction
+from wrcore.contact.search.approach import add_pressed
+from wrcore.contact.search.strip import lean_at, leaning, make_pose, turn_along, upright
+from wrcore.contact.surrogate.descriptors import PatchShape, describe, parabola_at
+from wrcore.contact.surrogate.network import force_remainder, run_network
+from wrcore.contact.surrogate.strips import close_strips, fill_strips, lift_strips, press_strips
+from wrcore.creep.kalker import coefficients_at
+from wrcore.kernels.jit import FUSED, jit
+from wrcore.wheels.exact_force import copy_deepest, mirror
+from wrcore.wheels.hertzian_force import (
+    OUT_OF_RANGE,
+    OUTSIDE_TRAINING,
+    contact_of,
+    detect_patches,
+    falling,
+    leaning_motion,
+)
+from wrcore.wheels.modes import FRESH, PATCHES_ONLY
+from wrcore.wheels.motion import WheelMotion, as_left, motion_of
+from wrcore.wheels.normal_damping import lift_of
+from wrcore.wheels.table.lookup import APART, DISK, FAR, LOCKED, SADDLE, _at_ellipse, lobe_end
+
+_ONE_PATCH = APART, FAR, SADDLE
+
+_ROUNDS = 5
+"""Evaluations of patches that press each other: the first one alone, then with the rise by the loads found last. Each
+round reduces the change of the loads to a tenth."""
+
+_LEAST_FRICTION = 0.04
+"""Friction that the network's inputs have below it; forces are those at the true friction."""
+
+_MOST_LOG_LOAD, _MOST_LOG_AXIS, _MOST_ANGLE = 0.6, 0.8, 0.15
+"""Bounds of what the network adds to ln N, ln a and ln b, and to the contact angle (rad). In training 99.9 % of the
+corrections are below half of them."""
+
+_MOST_PLACE, _MOST_WIDTH = 3.0, 3.0
+"""Bounds of the place across the patch over sigma, and half of that of the variance of its width over sigma^2; a
+parabolic overlap has 0 and 1.4."""
+
+_MOST_MOMENT = 1.0
+"""Bound of what the network adds to the moment about the normal, over friction times N times c."""
+
+
+class Pressed(NamedTuple):
+    """Normal contact of a patch, of a wheel that rolls forward."""
+
+    load: float
+    """Normal force, N; 0 if it does not touch."""
+    log_a: float
+    log_b: float
+    """Logarithms of the semi-axes over 1 m."""
+    p_max: float
+    """Largest pressure, Pa."""
+    px: float
+    py: float
+    pz: float
+    """Where it slips, from the wheelset's centre, m."""
+    angle: float
+    """Contact angle, rad."""
+    trust: float
+    """Share of the network's outputs that counts, 1 in the range of its training and near it."""
+
+
+NOTHING_PRESSED = approach.Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+_NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class Rolled(NamedTuple):
+    """Creep of a patch."""
+
+    xi: float
+    eta: float
+    phi: float
+    """Creepages and spin (1/m), without what friction on other patches adds."""
+    fx: float
+    fy: float
+    mz: float
+    """Forces along and across (N), and moment about the normal (N m)."""
+    missed: int
+    """Look-ups outside the creep table."""
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def bounded(x, bound):
+    """x up to half of the bound, then a curve that joins smoothly and never reaches the bound."""
+    half = 0.5 * bound
+    over = min(abs(x) - half, 1e6 * half)  # of infinity, too
+    if not over > 0.0:
+        return x if x == x else 0.0
+    return math.copysign(half + over / math.sqrt(1.0 + (over / half) * (over / half)), x)
+
+
+@jit(allocates=False, forceinline=True)
+def left_ahead(m):
+    """The motion of a left wheel that rolls forward, of which the wheel is a mirror image: a right one across the
+    track, one that rolls back along it."""
+    m = as_left(m)
+    if m.vx >= 0.0:
+        return m
+    return WheelMotion(
+        m.side, m.y, m.z, -m.ex, m.ey, m.ez, -m.vx, m.vy, m.vz, m.wx, -m.wy, -m.wz, m.bend_y, m.bend_z, m.friction
+    )
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _lifted_wheel(m, lift, rise, tilt, ellipse):
+    """Position of a wheel that the damping lifts, and that the other patches lift by ``rise`` and tilt about the place
+    of this patch: y and z of its centre (m), its axle's z component, and the part of y and z that is due to the tilt.
+    """
+    height, ty, tz = lift.share * lift.depth + rise, tilt * ellipse[2], -tilt * ellipse[1]
+    return m.y - height * lift.sine + ty, m.z + height * lift.cosine + tz, m.ez + tilt, ty, tz
+
+
+class LiftedPatch(NamedTuple):
+    """A patch of a wheel that damping and other patches lift: its form, what leads from a rail coordinate to the place
+    across the track from the wheelset's centre (m), and what the tilt by other patches adds to the place across and up
+    (m)."""
+
+    shape: PatchShape
+    aside: float
+    ty: float
+    tz: float
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work):
+    """Fill ``work.strips`` of the patch ``q`` of ``work.forces`` where the wheelset's centre stands at ``y`` and ``z``
+    and its axle has the component ``ez``; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap. Returns the pose, the
+    number of strips and their spacing (m)."""
+    first, last = work.forces.first[q], work.forces.last[q]
+    copy_deepest(rows, first, last, row)
+    pose = make_pose(1.0, y, z, m.ex, m.ey, ez, is_spatial)
+    low, high = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
+    n, step = fill_strips(geometry, pose, row, low, high, work.strips)
+    return pose, n, step
+
+
+@jit(allocates=False, fastmath=FUSED)
+def press_group(geometry, m, is_spatial, lean, rows, count, row, work):
+    """`wrcore.contact.search.approach.Pressed` of the ``count`` patches of a group, and the number of strips of the
+    last one,
+    which ``work.strips`` then holds; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap."""
+    total, n = NOTHING_PRESSED, 0
+    for q in range(count):
+        pose, n, step = _fill_patch(geometry, m, is_spatial, m.y, m.z, m.ez, rows, q, row, work)
+        if n > 0:
+            total = add_pressed(total, press_strips(geometry, pose, lean, work.strips, n, step))
+    return total, n
+
+
+@jit(allocates=False, fastmath=FUSED)
+def describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work):
+    """`LiftedPatch` of the patch ``q`` of ``work.forces``. ``filled``: number of strips that `press_group` has left of
+    an only patch, else 0. ``row`` (PATCH_COLUMNS,) becomes its deepest overlap, and ``work.network.descriptors`` those
+    of the patch."""
+    geometry, forces, n = model.geometry, work.forces, filled
+    y, z, ez, ty, tz = _lifted_wheel(m, lift, forces.rise[q], forces.tilt[q], forces.ellipses[q])
+    if filled > 0:
+        lift_strips(work.strips, filled, y - m.y, z - m.z)
+    else:
+        _, n, _ = _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work)
+    count = close_strips(work.strips, n) if n > 0 else 0
+    friction = max(m.friction, _LEAST_FRICTION)
+    shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, work.network.descriptors)
+    return LiftedPatch(shape, geometry.rail_distance - y + ty, ty, tz)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def press_patch(model, m, is_spatial, lean, lift, rows, q, filled, row, work):
+    """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel;
+    ``filled`` and ``row`` as for `describe_patch`. ``work.network.outputs`` become those of the patch."""
+    if not lift.share < 1.0:
+        return _NO_CONTACT
+    patch = describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work)
+    if not patch.shape.square > 0.0:
+        return _NO_CONTACT
+    trust = run_network(model.surrogate, work.network)
+    return pressed_of(model, patch, lean, work.forces.tilt[q], trust, work.network.outputs)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def pressed_of(model, patch, lean, tilt, trust, outputs):
+    """`Pressed` of a `LiftedPatch` for these ``outputs`` of the network, in axes that ``lean``."""
+    p = _pressed(model, patch.shape, trust, model.surrogate.corrections, outputs)
+    px, pz = leaning(model.geometry, lean, p.px, p.pz + patch.tz)
+    return Pressed(p.load, p.log_a, p.log_b, p.p_max, px, p.py + patch.aside, pz, p.angle - 0.5 * tilt, p.trust)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _pressed(model, shape, trust, scales, outputs):
+    """`Pressed` of a patch of this shape; ``py`` is its rail coordinate, ``px`` and ``pz`` are from the wheelset's
+    centre. ``scales`` multiply the network's first ``outputs``."""
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    half_width, size = math.sqrt(7.0) * shape.sigma, shape.length
+    depth = math.sqrt(0.9375 * shape.square / half_width)  # of the parabolic overlap with this M0 and sigma
+    stiffness, a, b, _ = hertz_shape_at(model.hertz, shape.curvature, depth / (half_width * half_width))
+    root = math.sqrt(depth)
+    load, a, b = modulus * stiffness * depth * root, a * root, b * root
+    p_max = 1.5 * load / (math.pi * a * b) * math.exp(bounded(scales[3] * outputs[3], 2.0 * _MOST_LOG_AXIS))
+    load *= math.exp(bounded(scales[0] * outputs[0], _MOST_LOG_LOAD))
+    log_a = math.log(a) + bounded(scales[1] * outputs[1], _MOST_LOG_AXIS)
+    log_b = math.log(b) + bounded(scales[2] * outputs[2], _MOST_LOG_AXIS)
+    e = bounded(scales[5] * outputs[5] * size / shape.sigma, _MOST_PLACE)
+    b = math.exp(log_b) / shape.sigma
+    spread = bounded(0.2 * b * b, 2.0 * _MOST_WIDTH)
+    angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)
+    angle += bounded(scales[6] * outputs[6], _MOST_ANGLE)
+    px = parabola_at(shape.ahead, shape.ahead_1, shape.ahead_2, shape.third, e, spread)
+    px += bounded(scales[4] * outputs[4], 1.0) * size
+    pz = parabola_at(shape.height, shape.height_1, shape.height_2, shape.third, e, spread)
+    pz += bounded(scales[7] * outputs[7], 1.0) * size
+    py = shape.lateral + e * shape.sigma * math.cos(shape.angle)
+    return Pressed(load, log_a, log_b, p_max, px, py, pz, angle, trust)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
+    """`Rolled` of a patch of a wheel that rolls forward; ``outputs`` are the network's.
+
+    Below the least speed spin fades out with the speed, so that nothing jumps where a wheel stops and rolls back."""
+    radius, cosine, sine = model.geometry.rolling_radius, math.cos(pressed.angle), math.sin(pressed.angle)
+    speed = max(m.vx, model.least_speed)
+    xi, eta, phi, _ = creepages(
+        m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, pressed.px, pressed.py, pressed.pz, cosine, sine, speed
+    )
+    limit = falling(model, m.friction, xi, eta, speed) * pressed.load
+    x, y, forward = xi + slip_xi, eta + slip_eta, min(m.vx / speed, 1.0)
+    f1, f2, m3, missed, c = _at_ellipse(model, pressed.log_a, pressed.log_b, limit, x, y, forward * phi)
+    m3 *= forward
+    unit = model.shear_modulus * c * c / (3.0 * limit)
+    c11, c22, _, _ = coefficients_at(pressed.log_a - pressed.log_b, model.creep.table.kalker)
+    px, py = x * unit * c11, y * unit * c22
+    root = 1.0 / (DISK + math.sqrt(DISK * DISK + px * px + py * py))
+    r1, r2, r3 = force_remainder(model.surrogate, outputs, px * root, py * root)
+    part = (m.wy * radius / speed - 1.0) / LOCKED
+    fade = max(0.0, 1.0 - part * part)
+    fade *= fade
+    f1, f2, m3 = f1 + fade * r1, f2 + fade * r2, m3 + fade * bounded(r3, _MOST_MOMENT)
+    less = 1.0 / max(math.sqrt(f1 * f1 + f2 * f2), 1.0)
+    f1, f2, m3 = without_power(less * f1, less * f2, m3, x, y, phi * c)
+    return Rolled(xi, eta, phi, limit * f1, limit * f2, limit * c * m3, missed)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def without_power(f1, f2, m3, x, y, spin):
+    """Creep force and moment that produce no power in the creepages ``x``, ``y`` and ``spin``.
+
+    Where they would, the moment is reduced first, then the force along the creepages."""
+    of_force, of_moment = f1 * x + f2 * y, m3 * spin
+    if of_force + of_moment > 0.0:
+        if of_moment > 0.0:
+            m3 *= max(-of_force, 0.0) / of_moment
+        excess = of_force - max(-of_moment, 0.0)
+        if excess > 0.0:
+            along = excess / (x * x + y * y)
+            f1, f2 = f1 - along * x, f2 - along * y
+    return f1, f2, m3
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _couple(model, count, forces):
+    """Find rise, tilt and slip of each patch by the loads and the friction on the others."""
+    per_load = 1.0 / (math.pi * contact_modulus(model.shear_modulus, model.poisson_ratio))
+    per_friction = 1.0 / (math.pi * model.shear_modulus)
+    for q in range(count):
+        one = ellipse_of(forces.ellipses[q])
+        rise = tilt = xi = eta = 0.0
+        for r in range(count):
+            if r == q or not (forces.load[r] > 0.0 and one.a > 0.0):
+                continue
+            other = ellipse_of(forces.ellipses[r])
+            value, slope = rise_by_pressure(one, other)
+            rise, tilt = rise + per_load * forces.load[r] * value, tilt + per_load * forces.load[r] * slope
+            x, y = slip_by_friction(model.poisson_ratio, one, other, forces.fx[r], forces.fy[r], forces.mz[r])
+            xi, eta = xi + per_friction * x, eta + per_friction * y
+        forces.rise[q], forces.tilt[q], forces.slip_xi[q], forces.slip_eta[q] = rise, tilt, xi, eta
+
+
+@jit(allocates=False, fastmath=FUSED)
+def find_patches(geometry, m, is_spatial, rows, first, last, forces):
+    """Number of patches that the overlaps from ``first`` to before ``last`` form; writes where each begins and ends,
+    and that nothing presses on them."""
+    pose, count = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial), 0
+    while first < last:
+        end = lobe_end(geometry, pose, rows, first, last, _ONE_PATCH)
+        forces.first[count], forces.last[count] = first, end
+        forces.rise[count] = forces.tilt[count] = forces.slip_xi[count] = forces.slip_eta[count] = 0.0
+        forces.load[count], forces.ellipses[count, :] = 0.0, 0.0
+        first, count = end, count + 1
+    return count
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _fill_row(m, p, r, place, row):
+    """Write a patch into its row of patches; ``place`` (m): x, y, z from the wheelset's centre."""
+    row[reduction.X], row[reduction.Y], row[reduction.Z] = place[0], place[1] + m.y, place[2] + m.z
+    row[reduction.ANGLE], row[reduction.COSINE] = p.angle, math.cos(p.angle)
+    row[reduction.SINE], row[reduction.NORMAL] = math.sin(p.angle), p.load
+    row[reduction.SEMI_A], row[reduction.SEMI_B] = math.exp(p.log_a), math.exp(p.log_b)
+    row[reduction.FX], row[reduction.FY], row[reduction.MZ] = r.fx, r.fy, r.mz
+    row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = r.xi, r.eta, r.phi
+    row[reduction.P_MAX], row[reduction.CELL] = p.p_max, 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def add_patch(geometry, m, lean, p, r, wrench, row):
+    """Add a patch's force and moment about the wheelset's centre to ``wrench``, and write its ``row``. Place and forces
+    are in axes that ``lean`` as the rail does under the patch."""
+    cosine, sine = math.cos(p.angle), math.sin(p.angle)
+    fy, fz = r.fy * cosine - p.load * sine, r.fy * sine + p.load * cosine
+    px, pz = upright(geometry, lean, p.px, p.pz)
+    fx, fz = upright(geometry, lean, r.fx, fz)
+    mx, mz = upright(geometry, lean, 0.0, r.mz * cosine)
+    add_force(px, p.py, pz, fx, fy, fz, wrench)
+    wrench[3] += mx
+    wrench[4] -= r.mz * sine
+    wrench[5] += mz
+    _fill_row(m, p, r, (px, p.py, pz), row)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lean_of_group(geometry, m, rows, first, last, deepest):
+    """How a rail that changes along the track leans under a group of overlaps; ``deepest`` becomes its deepest row."""
+    copy_deepest(rows, first, last, deepest)
+    return lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, scratch_rows, work):
+    """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
+    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten.
+    ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) is scratch."""
+    geometry, forces = model.geometry, work.forces
+    lean = lean_of_group(geometry, m, rows, first, last, scratch_rows[0])
+    moving = leaning_motion(geometry, m, lean)
+    count = find_patches(geometry, m, is_spatial, rows, first, last, forces)
+    pressed, filled = press_group(geometry, m, is_spatial, lean, rows, count, scratch_rows[0], work)
+    if not pressed.square > 0.0:
+        return kept
+    lift, rounds = lift_of(model, moving, pressed), 1 if count == 1 else _ROUNDS
+    filled = filled if count == 1 else 0
+    for turn in range(rounds):
+        for q in range(count):
+            p = press_patch(model, m, is_spatial, lean, lift, rows, q, filled, scratch_rows[q], work)
+            forces.load[q] = p.load
+            if not p.load > 0.0:
+                continue
+            r = roll_patch(model, moving, p, forces.slip_xi[q], forces.slip_eta[q], work.network.outputs)
+            forces.fx[q], forces.fy[q], forces.mz[q] = r.fx, r.fy, r.mz
+            write_ellipse(
+                forces.ellipses[q], p.px, p.py, p.pz, math.exp(p.log_a), math.exp(p.log_b), math.cos(p.angle),
+                math.sin(p.angle),
+            )  # fmt: skip
+            if turn == rounds - 1:
+                counters[OUT_OF_RANGE] += r.missed
+                counters[OUTSIDE_TRAINING] += p.trust < 1.0
+                add_patch(geometry, m, lean, p, r, wrench, scratch_rows[q])
+        if turn < rounds - 1:
+            _couple(model, count, forces)
+    for q in range(count):
+        if forces.load[q] > 0.0:
+            copy_into(rows[kept], scratch_rows[q])
+            kept += 1
+    return kept
+
+
+@jit(allocates=False)
+def mirror_back(rows, count, wrench):
+    """Patches and wrench of a wheel that rolls forward as those of its mirror image along x, which rolls back."""
+    wrench[0], wrench[4], wrench[5] = -wrench[0], -wrench[4], -wrench[5]
+    for i in range(count):
+        for column in (reduction.S_WHEEL, reduction.X, reduction.FX, reduction.MZ, reduction.XI, reduction.PHI):
+            rows[i, column] = -rows[i, column]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counters, scratch, mode=FRESH):
+    """Force and moment of the rails on all wheels; arguments as for `wrcore.wheels.hertzian_force.wheel_wrenches`."""
+    for i in range(motions.shape[0]):
+        for wheel in range(2):
+            rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
+            seen = motion_of(motions[i, wheel])
+            m = left_ahead(seen)
+            wrench[:] = 0.0
+            if seen.vx < 0.0:
+                turn_along(contact.geometry)
+            count, bound, is_spatial = detect_patches(contact, m, rows)
+            if not mode & PATCHES_ONLY:
+                first = kept = 0
+                while first < count:
+                    last = group_end(contact.geometry, rows, count, first)
+                    kept = group_forces(
+                        contact, m, is_spatial, rows, first, last, kept, wrench, counters, scratch.rows,
+                        scratch.surrogate,
+                    )  # fmt: skip
+                    first = last
+                count = kept
+                if seen.vx < 0.0:
+                    mirror_back(rows, count, wrench)
+                if seen.side < 0.0:
+                    mirror(rows, count, wrench)
+            if seen.vx < 0.0:
+                turn_along(contact.geometry)
+            counts[i, wheel], bounds[i, wheel] = count, bound
