@@ -1,6 +1,6 @@
 """All kinds of force elements by name: every file beside this one is a kind and holds its `KIND`.
 
-So is a module that an installed package names as an entry point of the group ``wrcore.forces``; these are looked for
+So is a module that an installed package names as an entry point of the group ``wrcore.elements``; these are looked for
 when a vehicle has a kind of that name.
 """
 
@@ -18,7 +18,7 @@ _MODULES = {
 
 KINDS = {name: module.KIND for name, module in _MODULES.items()}
 
-GROUP = "wrcore.forces"
+GROUP = "wrcore.elements"
 """Of entry points."""
 
 
