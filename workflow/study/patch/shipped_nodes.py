@@ -2,8 +2,8 @@
 
 Scenes run on an empty table, by `METHODS`: those of `study.patch.look_up`, and examples at speeds, on tracks and from
 starts that a user may well try. What they meet is kept, a group per pair of profiles: nodes, and which cells may be
-looked up (``wrcore/wheels/table/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what
-they meet besides is added.
+looked up (``wrcore/wheels/table/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and
+what they meet besides is added.
 """
 
 import argparse
