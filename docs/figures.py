@@ -10,7 +10,7 @@ from study.cost.plain.contact import Pair, cut_strips, patch_of_moments
 from study.cost.plain.forces import damping_factor, linear, shen_hedrick_elkins
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, save_figure, styled
 from wrcore.creep.kalker import kalker_data
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import Track
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "tests/data/creep/contact_examples.csv"

@@ -217,8 +217,8 @@ def _keys(schema, before):
 
 def names_page():
     """Channels of runs, counters and measures of sweeps."""
-    from wrcore.run.channels import DESCRIPTIONS, unit_of
-    from wrcore.run.validity import LIMITS
+    from wrcore.run.checks.validity import LIMITS
+    from wrcore.run.output.channels import DESCRIPTIONS, unit_of
 
     parts = ["# Channels, counters, measures", "\n## Channels of a run\n", "| channel | unit | |", "|---|---|---|"]
     parts += [f"| `{name}` | {unit_of(name)} | {_cell(text)} |" for name, text in DESCRIPTIONS.items()]

@@ -33,7 +33,7 @@ from wrcore.creep.cases import creep_force
 from wrcore.creep.kalker import kalker_data
 from wrcore.creep.table import CreepTable, load_table, write_table
 from wrcore.errors import InputError
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.streaming import simulate_to
 from wrcore.scene.description import load_scene

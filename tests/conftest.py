@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.scene import creep
 
 ROOT = Path(__file__).parent.parent

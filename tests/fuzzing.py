@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from tests.conftest import ELLIPTIC
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 
 STATUSES = {"completed", "derailed", "stalled", "failed"}
 

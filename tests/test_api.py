@@ -17,7 +17,9 @@ import wrcore as wr
 from tests.conftest import ELLIPTIC, ROOT, SCENES
 
 PUBLIC = sorted(set(wr.__all__) - {"__version__"})
-DOCUMENTED = sorted({getattr(wr, name).__module__ for name in PUBLIC} | {"wrcore.run.channels", "wrcore.run.progress"})
+DOCUMENTED = sorted(
+    {getattr(wr, name).__module__ for name in PUBLIC} | {"wrcore.run.output.channels", "wrcore.run.progress"}
+)
 
 
 @pytest.mark.parametrize("name", DOCUMENTED)

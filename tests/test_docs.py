@@ -139,7 +139,8 @@ def test_numbers_in_the_theory_are_those_of_the_code():
     from wrcore.creep.table import DEFAULT_TOLERANCE
     from wrcore.forces.drive import GRIP
     from wrcore.forces.kinds import damper, friction
-    from wrcore.geometry import irregularity, profile
+    from wrcore.geometry import irregularity
+    from wrcore.geometry.profiles import profile
     from wrcore.integrate import choice, engine, tolerances
     from wrcore.scene.description import load_scene
 

@@ -32,7 +32,7 @@ from wrcore.creep.build import Resolution
 from wrcore.creep.kalker import kalker_data
 from wrcore.creep.table import CreepTable, write_table
 from wrcore.errors import InputError
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.streaming import simulate_to
 from wrcore.scene.description import load_scene
 
@@ -294,7 +294,7 @@ def test_a_disk_that_fills_up_is_one_line(folder, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("wrcore.run.results.Datasets", full)
+    monkeypatch.setattr("wrcore.run.output.files.Datasets", full)
     status, _, err = run_command(["simulate", folder / "scene.yaml", "--out", out])
     assert status == 2 and err == f"wrcore: {out}: No space left on device\n"
     assert not list((folder / "out").iterdir())

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from study.hard_cases.study import unexplained
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "results" / "smoke"

@@ -13,7 +13,7 @@ from wrcore.equations.energy import CHANNELS, energy_balance, energy_channels
 from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.geometry.track import build_track
 from wrcore.integrate.integrator import integrate
-from wrcore.run.results import DESCRIPTIONS, load_run, unit_of, write_run
+from wrcore.run.output.files import DESCRIPTIONS, load_run, unit_of, write_run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.track.track import TrackModel

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve, averaged_second_derivative
-from wrcore.geometry.profile_sections import Arc, Line, Polynomial, evaluate, incline, usable_span
-from wrcore.geometry.standards import RAIL_HEADS, named_profile, rail_sections, s1002_sections
+from wrcore.geometry.profiles.profile import ProfileCurve, averaged_second_derivative
+from wrcore.geometry.profiles.sections import Arc, Line, Polynomial, evaluate, incline, usable_span
+from wrcore.geometry.profiles.standards import RAIL_HEADS, named_profile, rail_sections, s1002_sections
 
 R13 = 0.013
 

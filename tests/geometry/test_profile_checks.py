@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.standards import RAIL_HEADS, named_profile
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import RAIL_HEADS, named_profile
 
 S1002 = named_profile("S1002", "wheel")
 SPANS = [(-67, 59), (-60, 55), (-55, 55), (-50, 55), (-45, 50), (-42, 50), (-38, 50), (-54.5, 12), (-45, 12), (-60, 30)]

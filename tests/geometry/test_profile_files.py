@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from wrcore.cli import parser
-from wrcore.cli.options import profile_of
+from wrcore.cli.common.options import profile_of
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 SHARED = Path(os.environ.get("WRCORE_SHARED", Path(__file__).parents[3] / "shared"))
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 U = np.linspace(-0.0690, 0.0590, 1281)
 SEEN = U[20:-20]

@@ -7,8 +7,8 @@ import pytest
 
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import read_irregularity
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.cache import _say_once
 
 U = np.linspace(-0.060, 0.055, 1151)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from wrcore.errors import InputError
-from wrcore.geometry import profile_files, profile_sections
-from wrcore.geometry.standards import (
+from wrcore.geometry.profiles import files as profile_files
+from wrcore.geometry.profiles import sections as profile_sections
+from wrcore.geometry.profiles.standards import (
     RAIL_HEADS,
     circle_sections,
     list_profiles,

@@ -11,8 +11,8 @@ from tests.analysis.response.test_curving import cone
 from tests.conftest import ELLIPTIC
 from tests.synthetic import hunting_run
 from wrcore.errors import InputError
-from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS
-from wrcore.run.results import load_run
+from wrcore.run.output.derived import OF_WHEELS, OF_WHEELSETS
+from wrcore.run.output.files import load_run
 from wrcore.scene.description import load_scene
 
 SCENE, CHANGES = ELLIPTIC / "suspended_wheelset.yaml", {"speed": 30, "integration.duration": 0.1}

@@ -11,7 +11,7 @@ from tests.conftest import ELLIPTIC
 from wrcore.contact.normal.strips import MEMORY
 from wrcore.errors import InputError
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.state import State
 from wrcore.scene.description import load_scene

@@ -5,8 +5,8 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC
-from wrcore.run import reach
-from wrcore.run.reach import check_reach, warn_of_unreached
+from wrcore.run.checks import reach
+from wrcore.run.checks.reach import check_reach, warn_of_unreached
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

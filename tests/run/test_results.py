@@ -8,7 +8,7 @@ from synthetic import hunting_run
 from wrcore import __version__
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import BLOCK, new_hdf5, sign
-from wrcore.run.results import load_run, load_runs, unit_of, write_run
+from wrcore.run.output.files import load_run, load_runs, unit_of, write_run
 from wrcore.run.simulate import Run
 
 

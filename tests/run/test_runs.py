@@ -11,7 +11,7 @@ from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.contact.search.detection import detect
 from wrcore.equations.equations_of_motion import Equations, workspace
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 

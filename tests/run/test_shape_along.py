@@ -9,7 +9,7 @@ import pytest
 import wrcore as wr
 from tests.conftest import ELLIPTIC
 from wrcore.contact.search import reduction
-from wrcore.run.shape_along import NAME, ROUGH, ShapesAlong
+from wrcore.run.checks.shape_along import NAME, ROUGH, ShapesAlong
 
 RADIUS, DEPTH = 0.46, 6e-5
 FLAT = {"flats": [{"length": 0.03, "depth": 3e-4, "at": 0.6}], "angle": 0.0}

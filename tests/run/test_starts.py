@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.streaming import simulate_to
 from wrcore.scene.description import compile_scene, load_scene

@@ -18,7 +18,7 @@ from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import sign
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.simulate import output_blocks, output_times, simulate
 from wrcore.run.streaming import Blocks, Interrupts, simulate_to
 from wrcore.scene.description import load_scene

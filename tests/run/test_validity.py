@@ -6,8 +6,8 @@ import pytest
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.contact.search import reduction
+from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS, WIDEST, WIDEST_TURN, exceeded, look_up_errors
 from wrcore.run.simulate import simulate
-from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS, WIDEST, WIDEST_TURN, exceeded, look_up_errors
 from wrcore.scene.description import compile_scene, load_scene
 
 RADIUS = 0.3

@@ -21,7 +21,7 @@ from wrcore.creep.table import ensure_table
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import _schema, keys_of, read_yaml
 from wrcore.forces.kinds import KINDS
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run import simulation
 from wrcore.run.checkpoints import digest_of, model_fingerprint
 from wrcore.run.simulate import simulate

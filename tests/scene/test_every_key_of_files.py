@@ -6,11 +6,12 @@ import pytest
 import wrcore as wr
 from tests.conftest import ELLIPTIC
 from wrcore.errors import InputError
-from wrcore.geometry import profile_files, slice_files
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.slices import TURN
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails import files as slice_files
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.slices import TURN
+from wrcore.geometry.profiles import files as profile_files
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 
 def columns(path, kind):

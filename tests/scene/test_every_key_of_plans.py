@@ -19,7 +19,7 @@ from wrcore.analysis.wear.local_wear import WheelWear, friction_work
 from wrcore.analysis.wear.wear_laws import Sliding, wear_law
 from wrcore.analysis.wear.worn_profiles import flange
 from wrcore.errors.checked_yaml import _schema
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 
 EDGES = 2.5e-4 * np.arange(-300, 301)

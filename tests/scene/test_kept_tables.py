@@ -7,8 +7,8 @@ from tests.track.crossing_rails import write_rail
 from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.contact.changing_rails.section_table import shape_table
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.scene import kept_tables
 from wrcore.scene.kept_tables import OWN, kept_shape, kept_table
 

@@ -7,7 +7,7 @@ import pytest
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import _schema, _unit, keys_of, unit_of_key
 from wrcore.forces.kinds import KINDS
-from wrcore.run.channels import UNIT_SUFFIXES
+from wrcore.run.output.channels import UNIT_SUFFIXES
 from wrcore.sweep.batch import column_unit, write_table
 
 SCHEMAS = ("scene", "track", "vehicle", "sweep", "wear", "wear_law")

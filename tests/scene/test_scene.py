@@ -13,7 +13,7 @@ from wrcore.contact.search.reduction import ANGLE, FY, NORMAL
 from wrcore.equations.equations_of_motion import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.scene import description
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 SIDE = 6e-3  # m
 

@@ -17,11 +17,11 @@ from wrcore.contact.search.reduction import ANGLE, FX, FY, SEMI_A, SEMI_B, U_WHE
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_value
-from wrcore.geometry.crossing import Crossing
-from wrcore.geometry.joint import Joint
-from wrcore.geometry.made_rails import whole_head
-from wrcore.geometry.standards import named_profile
-from wrcore.geometry.switch import Switch
+from wrcore.geometry.changing_rails.crossing import Crossing
+from wrcore.geometry.changing_rails.joint import Joint
+from wrcore.geometry.changing_rails.made_rails import whole_head
+from wrcore.geometry.changing_rails.switch import Switch
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene

@@ -10,7 +10,7 @@ from tests.jacobian import test_jacobian as jacobian_tests
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene

@@ -11,7 +11,7 @@ from wrcore.contact.changing_rails.section_table import HEIGHT, U_STEP, shape_ta
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
 from wrcore.geometry.corrugation import Corrugation
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

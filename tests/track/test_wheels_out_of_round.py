@@ -21,10 +21,10 @@ from wrcore.contact.search import reduction as columns
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.slices import RailSlices
 from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.slices import RailSlices
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.track.changing_rails import interpolate, laid_under, with_own_arrays

@@ -16,9 +16,9 @@ from wrcore.analysis.pictures.plot_run import COLORS, HEIGHT, WIDTH, printed, va
 from wrcore.analysis.pictures.style import plain, styled
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import checked
-from wrcore.run.channels import unit_of
-from wrcore.run.results import load_run
-from wrcore.run.run import Run
+from wrcore.run.output.channels import unit_of
+from wrcore.run.output.files import load_run
+from wrcore.run.output.run import Run
 from wrcore.run.simulation import flat
 
 SAME_TIME = 1e-9

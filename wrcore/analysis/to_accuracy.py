@@ -18,7 +18,7 @@ from wrcore.analysis.assessment.wheels import wear_number, wheel_forces, wheelse
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Source, as_scene
 

@@ -30,8 +30,8 @@ def check_bodies(bodies, vehicle, source):
 
 def put_bodies(bodies, vehicle, state, path):
     """Write what a scene says of its bodies into a state on a tangent track, in place; all else stays. ``bodies`` has
-    values by name of the body and key, as channels have them (:mod:`wrcore.run.channels`): m, rad, m/s and rad/s,
-    relative to the axes of the track, which turn as they go along the path with the body."""
+    values by name of the body and key, as channels have them (:mod:`wrcore.run.output.channels`): m, rad, m/s and
+    rad/s, relative to the axes of the track, which turn as they go along the path with the body."""
     boxes = {name: values for name, values in bodies.items() if vehicle.data["bodies"][name]["kind"] == "axle_box"}
     for name, values in bodies.items():
         if name in boxes:

@@ -30,7 +30,7 @@ from wrcore.cli import (
     sweep,
     table,
 )
-from wrcore.cli.options import Parser
+from wrcore.cli.common.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 

@@ -1,7 +1,7 @@
 """``wrcore assess``: a stored run against a standard."""
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import columns
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import columns
 
 ABOUT = """
 Assess a stored run by EN 14363 (running safety and track loading: needs the forces of wheels at 1000 1/s or more) or EN
@@ -42,7 +42,7 @@ def add(commands):
 def run(options):
     from wrcore.analysis.assessment.assess import assess
     from wrcore.analysis.pictures.style import save_figure
-    from wrcore.run.results import load_run
+    from wrcore.run.output.files import load_run
 
     out = output(options.out) if options.out else None
     picture = output(options.plot, (".svg", ".png"), "--plot") if options.plot else None

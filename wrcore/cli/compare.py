@@ -1,7 +1,7 @@
 """``wrcore compare``: two stored runs beside each other."""
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import columns
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import columns
 
 ABOUT = """
 Compare two stored runs at the output times that both have: what does a modelling choice change? Printed are the keys

@@ -3,10 +3,10 @@
 import argparse
 import sys
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, pair_of
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import add_pair, columns, pair_of
 from wrcore.errors import InputError
-from wrcore.run.channels import DESCRIPTIONS
+from wrcore.run.output.channels import DESCRIPTIONS
 
 ABOUT = """
 Equivalent conicity of a rigid wheelset on its track over the amplitude of its swing (EN 15302).

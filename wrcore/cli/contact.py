@@ -4,8 +4,8 @@ import json
 import math
 import sys
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, as_runs, columns, pair_of
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import add_pair, as_runs, columns, pair_of
 from wrcore.errors import InputError
 
 ABOUT = """
@@ -99,10 +99,10 @@ def add(commands):
 
 def _pair(options, poses):
     """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail or the wheel is one of slices."""
-    from wrcore.cli.options import profile_of, slices_of
+    from wrcore.cli.common.options import profile_of, slices_of
     from wrcore.contact.changing_rails.sections import WheelOnSlices
-    from wrcore.geometry.profile import GAUGE_DEPTH
-    from wrcore.geometry.slices import RailSlices
+    from wrcore.geometry.changing_rails.slices import RailSlices
+    from wrcore.geometry.profiles.profile import GAUGE_DEPTH
 
     rail, out_of_round = slices_of(options, "rail"), slices_of(options, "wheel")
     distance, sizes = options.rail_distance, (options.rolling_radius, options.tape_circle_half_distance)

@@ -2,8 +2,8 @@
 
 from argparse import ArgumentTypeError
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import as_runs, columns
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import as_runs, columns
 from wrcore.errors import one_of
 
 ABOUT = """

@@ -1,7 +1,7 @@
 """``wrcore curving``: a scene's vehicle in the balance of constant curves."""
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import as_runs, columns
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import as_runs, columns
 
 ABOUT = """
 Balance of a scene's vehicle in constant curves, without a run over time: wheel forces, angle of attack and lateral

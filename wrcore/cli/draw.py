@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from wrcore.cli.files import output
+from wrcore.cli.common.files import output
 from wrcore.errors import InputError
 
 ABOUT = """

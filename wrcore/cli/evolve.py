@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from wrcore.cli.options import columns
+from wrcore.cli.common.options import columns
 from wrcore.errors import InputError
 
 ABOUT = """

@@ -1,6 +1,6 @@
 """``wrcore fmu``: a scene as a functional mock-up unit."""
 
-from wrcore.cli.files import output
+from wrcore.cli.common.files import output
 
 ABOUT = """
 Write a scene as a functional mock-up unit (FMI) for co-simulation, with all files that it names. The machine that runs

@@ -1,7 +1,7 @@
 """``wrcore profiles``: what can be named, and what a file of points holds."""
 
-from wrcore.cli.files import output
-from wrcore.cli.options import profile_of, profile_spec
+from wrcore.cli.common.files import output
+from wrcore.cli.common.options import profile_of, profile_spec
 from wrcore.errors import InputError
 
 ABOUT = """
@@ -33,7 +33,7 @@ def run(options):
 
 
 def _list():
-    from wrcore.geometry.standards import list_profiles
+    from wrcore.geometry.profiles.standards import list_profiles
 
     rows = list_profiles()
     rows.insert(0, {key: key for key in rows[0]})
@@ -44,7 +44,7 @@ def _list():
 
 
 def _show(options):
-    from wrcore.geometry.profile_files import kind_of
+    from wrcore.geometry.profiles.files import kind_of
 
     out = output(options.out, (".svg", ".png")) if options.out else None
     spec = profile_spec(options, options.file)

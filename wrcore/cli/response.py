@@ -1,7 +1,7 @@
 """``wrcore response``: frequency response of a scene's vehicle."""
 
-from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import columns
+from wrcore.cli.common.files import output, write_csv
+from wrcore.cli.common.options import columns
 from wrcore.errors import InputError
 
 ABOUT = """

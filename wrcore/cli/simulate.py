@@ -4,7 +4,7 @@ import argparse
 import json
 from functools import partial
 
-from wrcore.cli.files import HDF5, output, refuse_others
+from wrcore.cli.common.files import HDF5, output, refuse_others
 
 NOT_REACHED = 4
 """Exit status of a run that is not as accurate as asked for, or that left the rails: what came after is unknown."""
@@ -84,7 +84,7 @@ def _to_accuracy(options, scene, out):
 
 def _print_run(done, as_json):
     """How a run ended, what it cost, and which limits of validity it exceeded."""
-    from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS
+    from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS
 
     counters = done.counters
     factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0

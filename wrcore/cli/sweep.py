@@ -2,8 +2,8 @@
 
 import time
 
-from wrcore.cli.files import output, refuse_others
-from wrcore.cli.options import columns
+from wrcore.cli.common.files import output, refuse_others
+from wrcore.cli.common.options import columns
 from wrcore.errors import InputError
 
 ABOUT = """

@@ -1,6 +1,6 @@
 """``wrcore table``: creep tables."""
 
-from wrcore.cli.files import HDF5, output, refuse_others
+from wrcore.cli.common.files import HDF5, output, refuse_others
 
 ABOUT = """
 Creep tables: exact rolling contact, solved once on patches of all shapes. Scenes build the one they need by themselves.

@@ -1,7 +1,7 @@
 """Wheels out of round: flats, polygons and measured deviations of a wheel's radius over its angle.
 
-The deviation is the same over the wheel's width. Angles count as in `wrcore.geometry.slices.WheelSlices`.
-"""
+The deviation is the same over the wheel's width. Angles count as in
+`wrcore.geometry.changing_rails.slices.WheelSlices`."""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wrcore.geometry.slices import TURN
+from wrcore.geometry.changing_rails.slices import TURN
 
 BESIDE = 0.01
 """Length beside a flat over which a wheel sees it yet, m: more than half a window of

@@ -21,7 +21,7 @@ from wrcore.geometry.irregularity import (
     sum_of,
 )  # fmt: skip
 from wrcore.geometry.path import PathData, path_data, tangent_path
-from wrcore.geometry.profile import GAUGE_DEPTH
+from wrcore.geometry.profiles.profile import GAUGE_DEPTH
 from wrcore.geometry.ramps import STEEPEST, incline
 from wrcore.kernels import own
 from wrcore.kernels.named_laws import Laws

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wrcore.errors import InputError, short
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 
 COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": operator.gt}
 

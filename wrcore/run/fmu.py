@@ -26,10 +26,10 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.errors.input_files import digest_of_file
 from wrcore.errors.new_files import appearing
-from wrcore.geometry.slice_files import profiles_in, with_profiles
+from wrcore.geometry.changing_rails.files import profiles_in, with_profiles
 from wrcore.kernels.cache import say
 from wrcore.kernels.named_laws import LawFile
-from wrcore.run.channels import DESCRIPTIONS
+from wrcore.run.output.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start
 from wrcore.run.state import State
 from wrcore.scene.description import Scene

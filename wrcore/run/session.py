@@ -27,13 +27,13 @@ from wrcore.integrate.integrator import CHUNK, REFERENCES, STALL_STEP, Headway, 
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.asked import condition_of, on_grid, told_by, value_of
 from wrcore.run.checkpoints import model_fingerprint
+from wrcore.run.checks.reach import check_reach
+from wrcore.run.checks.validity import LOOK_UP_ERRORS
 from wrcore.run.inputs import Input, inputs_of, with_own_arrays
-from wrcore.run.reach import check_reach
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 from wrcore.run.simulate import LARGEST_RUN, STARTS, bytes_per_time, opened
 from wrcore.run.simulation import DERAILED_Y, Simulation
 from wrcore.run.state import State
-from wrcore.run.validity import LOOK_UP_ERRORS
 from wrcore.scene.description import Source
 
 RESOLUTION = 1e-9

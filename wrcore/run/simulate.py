@@ -18,10 +18,10 @@ from wrcore.creep.table import show_progress
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.integrate.trajectory import Checkpoint
+from wrcore.run.checks.reach import check_reach, warn_of_unreached
+from wrcore.run.checks.shape_along import warn_of_shapes
+from wrcore.run.output.run import Run
 from wrcore.run.progress import counted, simulated_time
-from wrcore.run.reach import check_reach, warn_of_unreached
-from wrcore.run.run import Run
-from wrcore.run.shape_along import warn_of_shapes
 from wrcore.run.simulation import Simulation
 from wrcore.run.state import State
 from wrcore.scene.description import Scene, Source, load_scene

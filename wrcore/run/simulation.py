@@ -27,11 +27,11 @@ from wrcore.integrate.integrator import integrate, needed_last
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.kernels.aside import compiled_aside
 from wrcore.run.checkpoints import model_fingerprint
-from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
-from wrcore.run.run import Run
-from wrcore.run.shape_along import ShapesAlong
+from wrcore.run.checks.shape_along import ShapesAlong
+from wrcore.run.checks.validity import exceeded, look_up_errors
+from wrcore.run.output.derived import OF_WHEELS, OF_WHEELSETS, asked_for
+from wrcore.run.output.run import Run
 from wrcore.run.state import State, from_state
-from wrcore.run.validity import exceeded, look_up_errors
 from wrcore.scene.description import Scene, compile_scene
 from wrcore.track.flexible_track import track_places
 from wrcore.track.track import track_poses

@@ -29,13 +29,13 @@ from wrcore.errors.new_files import hold, remove_folder, remove_remains
 from wrcore.integrate.integrator import REFERENCES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
-from wrcore.run.reach import check_reach, warn_of_unreached
-from wrcore.run.results import join_runs, read_part, write_going_on, write_run
-from wrcore.run.run import Run
-from wrcore.run.shape_along import warn_of_shapes
+from wrcore.run.checks.reach import check_reach, warn_of_unreached
+from wrcore.run.checks.shape_along import warn_of_shapes
+from wrcore.run.checks.validity import LOOK_UP_ERRORS
+from wrcore.run.output.files import join_runs, read_part, write_going_on, write_run
+from wrcore.run.output.run import Run
 from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
 from wrcore.run.simulation import ArcLengths, Simulation
-from wrcore.run.validity import LOOK_UP_ERRORS
 from wrcore.scene.description import Scene
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192

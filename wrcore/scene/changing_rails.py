@@ -14,12 +14,12 @@ from wrcore.contact.changing_rails.section_table import BLEND, SeenTable
 from wrcore.contact.changing_rails.sections import REACH
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.geometry.changing_rails.crossing import Crossing
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.joint import Joint
+from wrcore.geometry.changing_rails.slices import RailSlices
+from wrcore.geometry.changing_rails.switch import Switch
 from wrcore.geometry.corrugation import Corrugation
-from wrcore.geometry.crossing import Crossing
-from wrcore.geometry.joint import Joint
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.slices import RailSlices
-from wrcore.geometry.switch import Switch
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
 from wrcore.kernels.told import warn_once

@@ -32,7 +32,7 @@ from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.named_laws import Laws
 from wrcore.kernels.told import tell

@@ -7,9 +7,9 @@ import numpy as np
 from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.slices import TURN
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.told import warn_once
 from wrcore.scene.changing_rails import STEEPEST_ALONG

@@ -9,9 +9,9 @@ from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.input_files import digest_of_file
-from wrcore.geometry.profile_files import POINT_FILES
-from wrcore.geometry.slice_files import profiles_in
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails.files import profiles_in
+from wrcore.geometry.profiles.files import POINT_FILES
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 
 LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m

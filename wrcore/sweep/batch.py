@@ -33,7 +33,7 @@ from wrcore.errors.checked_yaml import unit_of_key
 from wrcore.errors.input_files import check_regular, check_unchanged
 from wrcore.errors.new_files import appearing, held, remove_folder, remove_remains
 from wrcore.integrate.integrator import integrate
-from wrcore.run.channels import unit_of
+from wrcore.run.output.channels import unit_of
 from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y, counters_of

@@ -34,8 +34,8 @@ from wrcore.bodies.body import STATE_SIZE, angles
 from wrcore.contact.search import reduction
 from wrcore.equations.equations_of_motion import Model
 from wrcore.integrate.trajectory import Trajectory
-from wrcore.run.derived import UNLOADED, creep_work
 from wrcore.run.motion import hunting_frequency
+from wrcore.run.output.derived import UNLOADED, creep_work
 from wrcore.run.simulation import evaluated
 from wrcore.track.track import track_poses
 

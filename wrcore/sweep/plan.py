@@ -21,7 +21,7 @@ from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
-from wrcore.run.reach import check_reach
+from wrcore.run.checks.reach import check_reach
 from wrcore.scene.changes import check_apart
 from wrcore.scene.description import Scene, changed_by_caller, changed_by_file
 from wrcore.scene.pairs import find_file

@@ -20,7 +20,7 @@ from wrcore.analysis.assessment.assess import (
 from wrcore.analysis.assessment.wheels import late_in
 from wrcore.cli import main
 from wrcore.errors import InputError
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 
 RATE, SPEED, LOAD = 1000.0, 20.0, 60e3
 

@@ -20,7 +20,7 @@ from wrcore.analysis.assessment.ride import (
 from wrcore.errors import InputError
 from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import build_track
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 
 G = 9.81
 

@@ -16,12 +16,12 @@ from wrcore.contact.changing_rails.sections import WINDOW, WheelOnSlices
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError
-from wrcore.geometry import slices
-from wrcore.geometry.crossing import Crossing
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails import slices
+from wrcore.geometry.changing_rails.crossing import Crossing
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 RADIUS, CROWN = 0.46, 0.08
 PROFILES = Path(os.environ.get("WRCORE_CONTACT", "")) / "testbank" / "profiles"

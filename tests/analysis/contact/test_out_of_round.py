@@ -16,11 +16,11 @@ from wrcore.contact.changing_rails.sections import WheelOnSlices
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.profile_files import read_profile
-from wrcore.geometry.slice_files import read_slices
-from wrcore.geometry.slices import RailSlices
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.slices import RailSlices
+from wrcore.geometry.profiles.files import read_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 LOAD = 5e4
 

@@ -7,7 +7,7 @@ from tests.analysis.assessment.test_assess import synthetic
 from wrcore.analysis.assessment.wheels import wheel_table
 from wrcore.analysis.wear.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
 from wrcore.errors import InputError
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 
 K = 300e6
 

@@ -37,7 +37,7 @@ from wrcore.analysis.wear.worn_rails import (
 from wrcore.analysis.wear.worn_rails import POINTS as RAIL_POINTS
 from wrcore.cli import main
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.kernels.cache import untold
 from wrcore.scene.description import load_scene
 

@@ -13,8 +13,8 @@ from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
-from wrcore.geometry.standards import named_profile
-from wrcore.run.derived import creep_work
+from wrcore.geometry.profiles.standards import named_profile
+from wrcore.run.output.derived import creep_work
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 from wrcore.wheels.exact_force import group_wrench

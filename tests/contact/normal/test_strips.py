@@ -21,8 +21,8 @@ from wrcore.contact.search.geometry import SLOPE
 from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_RAIL, U_WHEEL
 from wrcore.contact.search.strip import gap_at, make_pose
 from wrcore.contact.search.surfaces import ContactPlane
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 MODULUS = contact_modulus(8.2e10, 0.28)
 

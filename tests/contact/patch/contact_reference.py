@@ -20,9 +20,9 @@ import pandas as pd
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search.strip import make_pose
 from wrcore.contact.search.surfaces import Motion, contact_plane
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.profile_files import read_profile, read_simpack
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.files import read_profile, read_simpack
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 SHEAR_MODULUS, POISSON_RATIO, FRICTION = 8.2e10, 0.28, 0.3
 """Of all cases: Pa, -, -."""

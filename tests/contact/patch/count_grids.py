@@ -11,7 +11,7 @@ import numpy as np
 from tests.contact.normal.test_strips import MODULUS, height
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 LOADS = (1e4, 3e4, 5.5e4, 8e4)
 BIRTHS = (4.7e-3, 4.77e-3, 4.85e-3, 5.53e-3)

@@ -16,7 +16,7 @@ from wrcore.contact.normal.windows import guess_squares
 from wrcore.contact.rigid.height_at_load import height_of_zero
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search.detection import detect
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 MODULUS = contact_modulus(8.2e10, 0.28)
 

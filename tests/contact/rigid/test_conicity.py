@@ -12,8 +12,8 @@ from wrcore.contact.rigid.conicity import conicity_curve, en15302_tolerance, equ
 from wrcore.contact.rigid.first_touch import first_touch
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 
 REFERENCE = json.loads((DATA / "contact" / "en15302_reference.json").read_text())
 

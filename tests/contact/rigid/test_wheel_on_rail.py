@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, _geometry_of
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 
 def test_scenes_with_the_same_profiles_have_one_geometry_made_and_others_do_not():

@@ -12,7 +12,7 @@ from wrcore.contact.search.approach import LEVEL, approach_of, pressed_together
 from wrcore.contact.search.detection import axle_direction, find_patches
 from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.search.strip import gap_at, make_pose
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
 from wrcore.wheels.motion import WheelMotion

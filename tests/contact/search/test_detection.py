@@ -31,8 +31,8 @@ from wrcore.contact.search.reduction import (
 )
 from wrcore.contact.search.strip import gap_at, make_pose
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import Track
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene

@@ -18,7 +18,7 @@ from wrcore.contact.search.scan import (
     strip_gap,
 )
 from wrcore.contact.search.strip import make_pose
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.jit import jit
 
 

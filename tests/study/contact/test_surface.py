@@ -6,8 +6,8 @@ import pytest
 from study.contact.surface import rail_surface
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import centreline, rail_direction, track_frame
-from wrcore.geometry.profile import GAUGE_DEPTH
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import GAUGE_DEPTH
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES, Track, build_track
 
 CURVE = [

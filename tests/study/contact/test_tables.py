@@ -17,7 +17,7 @@ from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.contact.search.detection import axle_direction, detect
 from wrcore.contact.search.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
 from wrcore.contact.search.strip import make_pose
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 
 SIZES = {"gauge": 1.435, "rolling_radius": 0.46, "half_distance": 0.75}
 

@@ -7,7 +7,7 @@ import pytest
 from study.crossings.figures import fig_nose
 from study.crossings.nose import over_the_nose, summary, wheel_on_crossing
 from tests.conftest import SCENES
-from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.changing_rails.crossing import Crossing
 from wrcore.scene.description import load_scene
 
 

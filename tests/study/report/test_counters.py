@@ -4,8 +4,8 @@ import re
 
 from study.report.counters import PAGE, counters_table
 from tests.conftest import ROOT
+from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS, MEANINGS
 from wrcore.run.simulation import COUNTERS
-from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS, MEANINGS
 
 
 def test_every_counter_of_a_run_is_explained():

@@ -15,7 +15,7 @@ from wrcore.contact.search import reduction
 from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.surrogate.network import FORCE_CELLS, N_CORRECTIONS, WIDTH, Layers, Surrogate
 from wrcore.errors import InputError
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.wheels.motion import WheelMotion
 from wrcore.wheels.surrogate_force import bounded, surrogate_wrenches

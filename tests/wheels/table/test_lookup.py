@@ -22,10 +22,10 @@ from wrcore.contact.search.detection import find_patches
 from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.equations.equations_of_motion import Equations
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.integrate.integrator import integrate
-from wrcore.run.validity import LOOK_UP_ERRORS, look_up_errors
+from wrcore.run.checks.validity import LOOK_UP_ERRORS, look_up_errors
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.wheels import kernels as patch_kernels
 from wrcore.wheels import modes

@@ -4,7 +4,7 @@ import sys
 
 from study.accuracy.errors import combinations, reference_row, reference_runs, study
 from study.accuracy.models import reference_choice, twins, with_model_errors
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings = snakemake.params.settings

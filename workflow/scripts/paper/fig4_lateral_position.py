@@ -5,7 +5,7 @@ import sys
 from study.paper.figures import fig4_lateral_position
 from study.paper.tables import horizons
 from study.report.legible import save_figure
-from wrcore.run.results import load_runs
+from wrcore.run.output.files import load_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 cases = load_runs([*snakemake.input.planar, *snakemake.input.spatial, *snakemake.input.tight])

@@ -5,7 +5,7 @@ import sys
 from study.paper.figures import fig5_contact_points
 from study.paper.tables import horizons
 from study.report.legible import save_figure
-from wrcore.run.results import load_runs
+from wrcore.run.output.files import load_runs
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -3,7 +3,7 @@
 import sys
 
 from study.paper.tables import motion_table
-from wrcore.run.results import load_runs
+from wrcore.run.output.files import load_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 paths = snakemake.input.planar + snakemake.input.spatial + snakemake.input.tight + snakemake.input.mirrored

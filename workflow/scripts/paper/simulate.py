@@ -3,7 +3,7 @@
 import sys
 
 from study.creep_table import with_creep_table
-from wrcore.run.results import write_run
+from wrcore.run.output.files import write_run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

@@ -5,7 +5,7 @@ import sys
 from study.creep_table import with_creep_table
 from study.speeds.sweep import sweep_speeds
 from study.speeds.tables import speed_table
-from wrcore.run.results import write_run
+from wrcore.run.output.files import write_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 overrides = with_creep_table(snakemake.input.scene, snakemake.params.overrides, snakemake.input.table[0])

@@ -7,7 +7,7 @@ import pandas as pd
 from study.report.legible import save_figure
 from study.speeds.figures import guiding_forces
 from wrcore.analysis.assessment.wheels import wheel_table
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 run = load_run(snakemake.input.run)

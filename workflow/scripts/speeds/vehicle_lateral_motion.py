@@ -4,7 +4,7 @@ import sys
 
 from study.report.legible import save_figure
 from study.speeds.figures import lateral_motion
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 runs = [load_run(path) for path in snakemake.input.runs]

@@ -26,7 +26,7 @@ from wrcore.contact.search.reduction import (
     U_WHEEL,
 )  # fmt: skip
 from wrcore.contact.search.strip import cubic_at, gap_at, make_pose, strip_point
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.jit import jit
 
 MATERIAL = {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}

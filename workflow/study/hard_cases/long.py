@@ -10,7 +10,7 @@ import numpy as np
 from study.hard_cases.cases import NORM_LIMIT, Check, prepare, rows
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.integrate.trajectory import Trajectory
-from wrcore.run.results import load_run
+from wrcore.run.output.files import load_run
 from wrcore.run.streaming import simulate_to
 
 BLOCKS = 16

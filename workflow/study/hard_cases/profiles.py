@@ -8,7 +8,7 @@ import numpy as np
 from study.hard_cases.cases import Check, contacts, impulse_error, prepare, refused, rows, run, sound
 from wrcore.contact.search import reduction
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.scene.description import compile_scene
 
 IMPULSE_ERROR = 1e-3

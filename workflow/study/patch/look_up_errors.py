@@ -15,8 +15,8 @@ import pandas as pd
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search import reduction
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.wheels.hertzian_force import SOLVED
 from wrcore.wheels.table.store import pair_of
 

@@ -11,7 +11,7 @@ from study.style import LINES, derailed_at, shared_legend
 from wrcore.analysis.assessment.wheels import wheel_forces, wheelsets_of
 from wrcore.analysis.pictures.style import ACCENT, MM, styled
 from wrcore.geometry.track import SIDES
-from wrcore.run.derived import quotient
+from wrcore.run.output.derived import quotient
 
 KN = 1e-3
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import list_profiles, named_profile
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.geometry.profiles.standards import list_profiles, named_profile
 
 
 class NamedPair(NamedTuple):

@@ -27,7 +27,7 @@ from wrcore.contact.surrogate.network import N_CORRECTIONS
 from wrcore.contact.surrogate.strips import new_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.wheels.hertzian_force import alone
 from wrcore.wheels.surrogate_force import (

@@ -35,8 +35,8 @@ from wrcore.analysis.assessment.wheels import late_in, wheel_forces, wheelsets_o
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.derived import quotient
-from wrcore.run.run import Run
+from wrcore.run.output.derived import quotient
+from wrcore.run.output.run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,6 +1,6 @@
 """What a run says of its wheels: loads, guiding forces, wear, pressure.
 
-Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
+Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.output.derived`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import pandas as pd
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.derived import forces_on_rail, quotient, rolling_speed
-from wrcore.run.run import Run
+from wrcore.run.output.derived import forces_on_rail, quotient, rolling_speed
+from wrcore.run.output.run import Run
 
 Side = Annotated[str, OneOf(SIDES)]
 
@@ -129,7 +129,7 @@ def greatest_pressure(run, wheelset, side):
 
 @checked
 def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
-    """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
+    """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.output.run.Run.wheel_forces`.
 
     Parameters
     ----------

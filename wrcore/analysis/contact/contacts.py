@@ -19,8 +19,8 @@ from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS, REDUCTIO
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked, same_shape
 from wrcore.geometry.track import SIDES
-from wrcore.run.run import Channels
-from wrcore.run.validity import flags
+from wrcore.run.checks.validity import flags
+from wrcore.run.output.run import Channels
 from wrcore.wheels.hertzian_force import COUNTERS, wheel_wrenches
 from wrcore.wheels.motion import MOTION as _MOTION
 
@@ -138,7 +138,7 @@ def _found(sides, y, z, roll, yaw, load, speed, omega, vy, yaw_rate, mu):
 
 
 def _limits(sides, rows, roll, yaw):
-    """Flags of :func:`wrcore.run.validity.flags` of n poses with patches (n, 2, MAX_PATCHES, PATCH_COLUMNS)."""
+    """Flags of :func:`wrcore.run.checks.validity.flags` of n poses with patches (n, 2, MAX_PATCHES, PATCH_COLUMNS)."""
     contact = sides[0]._still._replace(geometries=tuple(one.geometry for one in sides))
     return {name: one[:, 0] for name, one in flags(contact, rows[:, None], roll[:, None], yaw[:, None]).items()}
 

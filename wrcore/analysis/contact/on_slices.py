@@ -11,7 +11,7 @@ from wrcore.contact.search.strip import make_pose
 from wrcore.contact.search.surfaces import ContactPlane, surface_gap
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
-from wrcore.run.shape_along import ROUGH
+from wrcore.run.checks.shape_along import ROUGH
 from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID
 
 MODELS = ("maximum", "moment", "exact", "grid")

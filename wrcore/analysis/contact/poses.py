@@ -12,7 +12,7 @@ from wrcore.contact.rigid.height_at_load import is_not_loaded
 from wrcore.contact.search import reduction as columns
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
-from wrcore.run.validity import FLAGS, flags
+from wrcore.run.checks.validity import FLAGS, flags
 
 ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
 """Columns of rolling, empty where the wheelset does not move."""

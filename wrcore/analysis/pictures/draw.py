@@ -19,9 +19,9 @@ from wrcore.analysis.wear.evolve import profiles_over_distance
 from wrcore.analysis.wear.wear_folder import TABLE, rows_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.run.results import load_run
-from wrcore.run.run import Run
+from wrcore.geometry.profiles.profile import ProfileCurve
+from wrcore.run.output.files import load_run
+from wrcore.run.output.run import Run
 from wrcore.scene.description import Scene, Source, as_scene, scene_of
 
 

@@ -11,9 +11,9 @@ from wrcore.analysis.pictures.plot_run import COLORS
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, styled
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import checked
-from wrcore.geometry.profile import SPACING
+from wrcore.geometry.profiles.profile import SPACING
 from wrcore.geometry.track import SIDES
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 from wrcore.scene.description import Source, scene_of
 
 LEAST = 1.0

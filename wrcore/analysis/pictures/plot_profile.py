@@ -5,8 +5,8 @@ import math
 from matplotlib.figure import Figure
 
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, styled
-from wrcore.geometry.profile import GAUGE_DEPTH, STEEPEST
-from wrcore.geometry.profile_points import Outline
+from wrcore.geometry.profiles.points import Outline
+from wrcore.geometry.profiles.profile import GAUGE_DEPTH, STEEPEST
 
 
 @styled

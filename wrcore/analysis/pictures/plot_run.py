@@ -14,8 +14,8 @@ from wrcore.analysis.pictures.style import plain, styled
 from wrcore.errors import InputError, similar
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.channels import UNIT_SUFFIXES, unit_of
-from wrcore.run.run import Run
+from wrcore.run.output.channels import UNIT_SUFFIXES, unit_of
+from wrcore.run.output.run import Run
 
 PRINTED = {
     "m": (1e3, "mm"), "rad": (1e3, "mrad"), "N": (1e-3, "kN"), "N m": (1.0, "N m"), "J": (1e-3, "kJ"),

@@ -20,7 +20,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.path_pieces import CANT_BASE
 from wrcore.geometry.track import LEAST_RADIUS, SIDES, WIDENED
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 from wrcore.scene.description import Scene, Source, as_scene
 from wrcore.vehicle.description import GRAVITY
 

@@ -21,7 +21,7 @@ from wrcore.analysis.pictures.style import styled
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.run import Run
+from wrcore.run.output.run import Run
 
 YIELD_IN_SHEAR = 300e6  # of a wheel or rail steel that has hardened, Pa (chosen)
 BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)  # whole life rail model: N, and damage per passage

@@ -38,7 +38,7 @@ from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import untold
 from wrcore.run.simulate import simulate

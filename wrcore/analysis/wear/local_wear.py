@@ -2,10 +2,10 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.derived`). Or the real patch says it, solved exactly where the wheel was and as
-it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend, scaled by one
-factor a wheel. A wear law
-(:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is lost per metre rolled and area of contact.
+forces and creepages (:mod:`wrcore.run.output.derived`). Or the real patch says it, solved exactly where the wheel was
+and as it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend, scaled
+by one factor a wheel. A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is lost per metre rolled and
+area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
 
@@ -33,9 +33,9 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
-from wrcore.run.derived import creep_work, rolling_speed
+from wrcore.run.output.derived import creep_work, rolling_speed
+from wrcore.run.output.run import Run
 from wrcore.run.progress import counted
-from wrcore.run.run import Run
 from wrcore.scene.description import Scene, Source
 from wrcore.scene.friction import read_friction
 from wrcore.scene.stored import laws_of_stored

@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, spacing_of, write_points
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 
 

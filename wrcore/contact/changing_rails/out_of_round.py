@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wrcore.geometry.changing_rails.slices import TURN, WheelSlices
 from wrcore.geometry.out_of_round import whole_turn
-from wrcore.geometry.profile import SPACING
-from wrcore.geometry.slices import TURN, WheelSlices
+from wrcore.geometry.profiles.profile import SPACING
 from wrcore.kernels.jit import jit
 
 STEP = 1e-3

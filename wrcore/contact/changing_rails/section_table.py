@@ -33,8 +33,8 @@ from wrcore.contact.search.geometry import (
     zone_planar_errors,
 )
 from wrcore.errors import InputError
-from wrcore.geometry.profile import ProfileCurve, averaged_second_derivative
-from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.changing_rails.slices import RailSlices
+from wrcore.geometry.profiles.profile import ProfileCurve, averaged_second_derivative
 
 S_STEP, U_STEP = 2e-3, 3e-4
 """Distances of the nodes along and across, m."""

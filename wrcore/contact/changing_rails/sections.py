@@ -29,8 +29,8 @@ from wrcore.contact.search.detection import axle_direction
 from wrcore.contact.search.geometry import contact_geometry
 from wrcore.contact.search.strip import make_pose, strip_point
 from wrcore.contact.search.surfaces import ContactPlane, wheel_height
-from wrcore.geometry.profile import SPACING, ProfileCurve, averaged_second_derivative
-from wrcore.geometry.slices import RailSlices, WheelSlices
+from wrcore.geometry.changing_rails.slices import RailSlices, WheelSlices
+from wrcore.geometry.profiles.profile import SPACING, ProfileCurve, averaged_second_derivative
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.jit import jit
 

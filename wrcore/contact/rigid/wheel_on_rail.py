@@ -12,7 +12,7 @@ import numpy as np
 from wrcore.contact.search.geometry import contact_geometry
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import checked
-from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
+from wrcore.geometry.profiles.profile import GAUGE_DEPTH, ProfileCurve
 from wrcore.geometry.track import GAUGES, SIDES
 
 RADII, HALF_DISTANCES = (0.05, 2.0), (0.2, 1.5)

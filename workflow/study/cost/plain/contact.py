@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profiles.profile import ProfileCurve
 
 CURVATURE_FLOOR = 0.5
 """Smallest relative curvature that the reduction ``maximum`` hands to Hertz, 1/m."""

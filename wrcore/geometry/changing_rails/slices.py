@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile import GAUGE_DEPTH, SPACING, STEEPEST, ProfileCurve, averaged_second_derivative
+from wrcore.geometry.profiles.profile import GAUGE_DEPTH, SPACING, STEEPEST, ProfileCurve, averaged_second_derivative
 from wrcore.kernels.jit import jit
 
 PATH_STEP = 5e-4

@@ -6,7 +6,7 @@ import textwrap
 from pathlib import Path
 
 from wrcore.errors import InputError, one_of, similar
-from wrcore.run.channels import DESCRIPTIONS, unit_of
+from wrcore.run.output.channels import DESCRIPTIONS, unit_of
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
@@ -93,7 +93,7 @@ def pair_of(options):
 def profile_of(options, spec, kind):
     """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply. ``--inclination`` is that of
     the rail in a pair."""
-    from wrcore.geometry.standards import named_profile
+    from wrcore.geometry.profiles.standards import named_profile
 
     beside_a_rail = kind == "wheel" and hasattr(options, "rail")
     return named_profile(profile_spec(options, spec), kind, None if beside_a_rail else ratio(options.inclination))
@@ -116,7 +116,7 @@ def profile_spec(options, spec):
 def slices_of(options, kind):
     """`RailSlices` of ``--rail`` or `WheelSlices` of ``--wheel``; None where it is the same everywhere."""
     from wrcore.errors.checked_yaml import parse_value
-    from wrcore.geometry.slice_files import is_slices, read_slices
+    from wrcore.geometry.changing_rails.files import is_slices, read_slices
 
     spec = getattr(options, kind)
     said = spec.lstrip().startswith("{")

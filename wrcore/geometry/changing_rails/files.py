@@ -26,8 +26,8 @@ import numpy as np
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.column_files import header_of, named_columns, read_column_file, split_unit
 from wrcore.errors.input_files import check_regular
-from wrcore.geometry.profile_files import read_points
-from wrcore.geometry.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
+from wrcore.geometry.changing_rails.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
+from wrcore.geometry.profiles.files import read_points
 from wrcore.kernels.told import warn_once
 
 SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}

@@ -9,7 +9,7 @@ convention without a header: declare ``unit: mm``. Lines ``Name=value`` before t
 directions the columns count, and from where, is declared beside the path: ``mirrored``, ``downwards``, ``shift``.
 
 SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down). MiniProf and
-Vampire: `wrcore.geometry.profile_meters`.
+Vampire: `wrcore.geometry.profiles.meters`.
 """
 
 import re
@@ -20,10 +20,10 @@ import numpy as np
 
 from wrcore.errors import InputError, one_of
 from wrcore.errors.column_files import read_column_file, read_text, split_unit
-from wrcore.geometry import profile_meters
-from wrcore.geometry.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
-from wrcore.geometry.profile_checks import UNITS, Mends, check_extent, likely_unit
-from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated
+from wrcore.geometry.profiles import meters as profile_meters
+from wrcore.geometry.profiles.checks import UNITS, Mends, check_extent, likely_unit
+from wrcore.geometry.profiles.meters import METER_FILES, VAMPIRE_FILES, Stated
+from wrcore.geometry.profiles.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
 from wrcore.kernels.cache import warn
 
 _SIMPACK = (".prw", ".prr")

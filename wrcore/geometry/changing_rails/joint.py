@@ -1,6 +1,6 @@
 """A dipped joint made by a formula, as a table of slices, usable by anybody.
 
-    python -m wrcore.geometry.joint FOLDER
+    python -m wrcore.geometry.changing_rails.joint FOLDER
 
 writes ``joint.csv`` and its profiles: two straight ends of rail that lean towards each other by an angle 2 alpha, the
 measure of Jenkins et al. (Railway Engineering Journal 3, 1974), and level out behind them. Heads are those of 60E1,
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.geometry.made_rails import MadeRail, whole_head
+from wrcore.geometry.changing_rails.made_rails import MadeRail, whole_head
 
 NEAR = 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05
 """Arc lengths of slices beside the kink, m: cubics run through them."""

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.geometry import profile_points, profile_sections
+from wrcore.geometry.profiles import points as profile_points
+from wrcore.geometry.profiles import sections as profile_sections
 
 SPACING = 5e-5
 """Default distance of nodes, m. Hermite error on a 13 mm arc: 0.01 um at slope 5 and 1.2 um at slope 10 (vertical)."""
@@ -68,7 +69,7 @@ class ProfileCurve:
         Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
         stays) after a turn by ``inclination`` (0: they lie in track pose). ``trim`` keeps the single-valued portion
         around the origin instead of refusing a profile that turns back. ``name``, the points' ``lines`` in a file and
-        ``mends`` (`wrcore.geometry.profile_checks.Mends`) are for messages; False takes points of any shape."""
+        ``mends`` (`wrcore.geometry.profiles.checks.Mends`) are for messages; False takes points of any shape."""
         outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing, mends)
         low, high = outline.working_span(STEEPEST, trim)
         nodes = _nodes(low, high, spacing)

@@ -1,6 +1,6 @@
 """A switch made by a formula, as a table of slices: stock rail and blade of a turnout, usable by anybody.
 
-    python -m wrcore.geometry.switch FOLDER
+    python -m wrcore.geometry.changing_rails.switch FOLDER
 
 writes ``switch.csv`` and its profiles, of the rail on whose side the wheels pass from the stock rail to the blade. Seen
 along either route the stock rail leaves to the field side by s^2/(2 R), as tangent and circle part, and the blade fills
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.geometry.made_rails import MadeRail, half_width, narrow_head, whole_head
+from wrcore.geometry.changing_rails.made_rails import MadeRail, half_width, narrow_head, whole_head
 
 
 @dataclass(frozen=True)

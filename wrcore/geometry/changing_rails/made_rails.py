@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from wrcore.geometry.slices import RailSlices, Slice, sheets_of
-from wrcore.geometry.standards import named_profile
+from wrcore.geometry.changing_rails.slices import RailSlices, Slice, sheets_of
+from wrcore.geometry.profiles.standards import named_profile
 
 EVEN = 5e-4
 """Distance of points, m."""

@@ -15,11 +15,11 @@ from wrcore import __version__
 from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.run.channels import DESCRIPTIONS as DESCRIPTIONS
-from wrcore.run.channels import unit_of as unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
-from wrcore.run.datasets import ROWS, Datasets, describe, write_values
-from wrcore.run.run import Run
+from wrcore.run.output.channels import DESCRIPTIONS as DESCRIPTIONS
+from wrcore.run.output.channels import unit_of as unit_of
+from wrcore.run.output.datasets import ROWS, Datasets, describe, write_values
+from wrcore.run.output.run import Run
 from wrcore.run.state import State
 from wrcore.scene.stored import StoredScene
 

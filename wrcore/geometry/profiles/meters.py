@@ -18,7 +18,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.column_files import read_column_file
-from wrcore.geometry.profile_checks import Mends
+from wrcore.geometry.profiles.checks import Mends
 
 METER_FILES = (".whl", ".ban", ".mpt")
 VAMPIRE_FILES = (".whe", ".rai")

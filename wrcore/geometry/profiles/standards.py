@@ -10,9 +10,9 @@ import numpy as np
 from wrcore.errors import InputError, similar
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import parse_ratio
-from wrcore.geometry import profile_files
-from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
-from wrcore.geometry.profile_sections import Arc, Line, Polynomial, incline
+from wrcore.geometry.profiles import files as profile_files
+from wrcore.geometry.profiles.profile import SPACING, WINDOW, ProfileCurve
+from wrcore.geometry.profiles.sections import Arc, Line, Polynomial, incline
 
 _MM = 1e-3
 
@@ -145,7 +145,7 @@ def named_profile(
     spec : str or dict
         "S1002" (wheel); "UIC60-MBench", "60E1", ... (rails, `RAIL_HEADS`); "cone:1/20" (wheel); "circle:0.3" (rail,
         radius in m); the path of a point file (CSV, SIMPACK, MiniProf, Vampire); or ``{"points": path, "unit": "mm",
-        "tape_circle": 0.07, ...}`` of which only ``points`` is required: `wrcore.geometry.profile_files.read_profile`.
+        "tape_circle": 0.07, ...}`` of which only ``points`` is required: `wrcore.geometry.profiles.files.read_profile`.
     kind : {"wheel", "rail"}
         What the profile is used for.
     inclination : float, optional

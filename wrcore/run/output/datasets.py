@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5p, h5r, h5s, h5t
 
-from wrcore.run.channels import DESCRIPTIONS, unit_of
+from wrcore.run.output.channels import DESCRIPTIONS, unit_of
 
 ROWS = 8192
 """Rows of a chunk at most."""

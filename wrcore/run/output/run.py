@@ -12,8 +12,8 @@ import numpy as np
 import wrcore
 from wrcore.errors import InputError, UnknownNameError, similar
 from wrcore.errors.checked_calls import checked
-from wrcore.run.channels import DESCRIPTIONS, unit_of
-from wrcore.run.derived import derived_channels
+from wrcore.run.output.channels import DESCRIPTIONS, unit_of
+from wrcore.run.output.derived import derived_channels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +110,7 @@ class Run:
         Output times, s.
     groups : dict of str to dict of str to ndarray
         Channels by group. A body's group (``wheelset``) holds arrays of shape (n,), in the axes of the track where the
-        body is (:mod:`wrcore.run.channels`); a contact's group
+        body is (:mod:`wrcore.run.output.channels`); a contact's group
         (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
         whole model's energies and powers. Names carry the unit.
     counters : dict
@@ -131,7 +131,7 @@ class Run:
     --------
     ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N,
     ``run["wheelset/left"].Y_N`` the lateral force on the rail, which follows from the contacts' channels
-    (:mod:`wrcore.run.derived`).
+    (:mod:`wrcore.run.output.derived`).
 
     >>> import numpy as np
     >>> run = Run({"name": "still"}, "completed", "", np.array([0.0, 0.5]), {"wheelset": {"y_m": np.zeros(2)}})
@@ -274,7 +274,7 @@ class Run:
             Index ``t_s``; per side (``left``, ``right``) ``Q_left_N`` (vertical), ``Y_left_N`` (lateral, to the field
             side), ``Y_over_Q_left``, ``T_gamma_left_N``, ``T_gamma_spin_left_N``, ``creep_power_left_W`` and
             ``p_max_left_Pa``; ``sum_Y_N``, the lateral force on the track, to the left. Definitions:
-            :mod:`wrcore.run.derived`.
+            :mod:`wrcore.run.output.derived`.
 
         Raises
         ------

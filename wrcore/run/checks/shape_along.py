@@ -15,7 +15,7 @@ import numpy as np
 from wrcore.contact.changing_rails.out_of_round import STEP, SlicedWheel
 from wrcore.contact.changing_rails.sections import AHEAD, BEND, HEIGHT, WheelOnSlices
 from wrcore.contact.search import reduction
-from wrcore.geometry.slices import TURN, RailSlices
+from wrcore.geometry.changing_rails.slices import TURN, RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
 

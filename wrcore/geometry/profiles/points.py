@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile_checks import Mends, check_beside, check_extent, check_rail, check_wheel
-from wrcore.geometry.profile_smoothing import even_out
+from wrcore.geometry.profiles.checks import Mends, check_beside, check_extent, check_rail, check_wheel
+from wrcore.geometry.profiles.smoothing import even_out
 from wrcore.kernels.cache import warn
 
 if TYPE_CHECKING:  # a third of a second that runs with standard profiles need not wait
@@ -137,8 +137,8 @@ class Outline:
 
 def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0, mends=None):
     """Outline through points that have been checked, in its pose: wheel f(0) = 0, rail with its origin at the highest
-    point; arguments as for `wrcore.geometry.profile.ProfileCurve.from_points`. ``mends`` (`Mends`): what messages
-    advise, False where the shape needs no check."""
+    point; arguments as for `wrcore.geometry.profiles.profile.ProfileCurve.from_points`. ``mends`` (`Mends`): what
+    messages advise, False where the shape needs no check."""
     mends = Mends() if mends is None else mends
     u, f = np.array(u, dtype=float), np.array(f, dtype=float)
     lines = np.arange(1, u.size + 1) if lines is None else np.asarray(lines)

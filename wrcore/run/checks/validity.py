@@ -6,7 +6,7 @@ run counts at its output times, not while it is integrated.
 `conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
 `profile_edge`         patches that reach beyond the end of a profile
 `search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
-`not_parabolic`        patches whose gap along the rail is no parabola (`wrcore.run.shape_along`)
+`not_parabolic`        patches whose gap along the rail is no parabola (`wrcore.run.checks.shape_along`)
 `before_irregularity`  output times at which no wheelset has reached the first sample of the track's irregularity
 `beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
 `hollow_ahead`         patches of a yawed wheel (spatial detection) whose surface there is hollow along the rail

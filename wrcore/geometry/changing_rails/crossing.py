@@ -1,6 +1,6 @@
 """A crossing made by a formula, as a table of slices: wing rail and nose of a turnout 1:12, usable by anybody.
 
-    python -m wrcore.geometry.crossing FOLDER
+    python -m wrcore.geometry.changing_rails.crossing FOLDER
 
 writes ``crossing.csv`` and its profiles. A straight crossing is the same for both routes, but mirrored. The wing bends
 away to the field side at s = 0, the knuckle. The nose begins where it is 12 mm wide; its running edge continues the
@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from wrcore.geometry.made_rails import MadeRail, half_width, narrow_head, whole_head
+from wrcore.geometry.changing_rails.made_rails import MadeRail, half_width, narrow_head, whole_head
 
 
 @dataclass(frozen=True)

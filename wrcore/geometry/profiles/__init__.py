@@ -1,0 +1,1 @@
+"""Profiles of wheels and rails: named ones, files of points, checks, smoothing."""

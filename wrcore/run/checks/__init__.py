@@ -1,0 +1,1 @@
+"""Whether a run stayed where its models and inputs are valid."""

@@ -1,0 +1,1 @@
+"""What is left of a run: channels, their units and meaning, files."""
