@@ -17,7 +17,7 @@ from wrcore.wheels.surrogate_force import _pressed
 from wrcore.wheels.table.lookup import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
 
 LIMITS = APART, FAR, SADDLE
-"""Limits of `lobe_end` at which overlaps are one patch, those of `surrogate_wheel`."""
+"""Limits of `lobe_end` at which overlaps are one patch, those of `wrcore.wheels.surrogate_force`."""
 
 FLANGE, FIELD = -0.058, 0.050
 """Range of the wheel profile in which first contact is searched, m."""

@@ -239,7 +239,7 @@ class ExactPatches:
         return velocities / velocities[:, :1]
 
     def _corrections(self, found, slip, angle, b, numbers):
-        """Corrections (N_CORRECTIONS,) with which `surrogate_wheel` finds this place and angle and these ``numbers``:
+        """Corrections (N_CORRECTIONS,) with which `surrogate_force` finds this place and angle and these ``numbers``:
         ln of N, a, b and p_max."""
         shape, base, y = found.shape, found.numbers, found.position[0]
         lateral = slip[1] + y - self.model.geometry.rail_distance - shape.lateral
