@@ -7,7 +7,7 @@ import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 CHANNELS = {
     "x": "x_m", "y": "y_m", "z": "z_m", "roll": "roll_rad", "yaw": "yaw_rad", "vx": "vx_m_per_s", "vy": "vy_m_per_s",

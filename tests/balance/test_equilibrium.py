@@ -11,9 +11,12 @@ from tests.conftest import ELLIPTIC, ROOT
 from wrcore.balance.equilibrium import displaced, wheel_loads
 from wrcore.bodies.body import STATE_SIZE, matrix_of
 from wrcore.contact.search import reduction
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
+from wrcore.vehicle.description import GRAVITY
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
 CAR = 32000 * GRAVITY

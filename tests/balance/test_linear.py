@@ -15,10 +15,12 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.marker import FRAME
 from wrcore.contact.search import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.equations.equations_of_motion import Equations, Model, state_size
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import Model, state_size
 from wrcore.integrate.integrator import integrate
 from wrcore.run.motion import growth_rate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.vehicle.description import build_vehicle
 
 

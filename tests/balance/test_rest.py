@@ -9,7 +9,8 @@ from wrcore.balance import initial
 from wrcore.balance.equilibrium import Equilibrium
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 
 @pytest.mark.parametrize("gauge", [1.0, 1.668, 1.9])

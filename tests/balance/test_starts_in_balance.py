@@ -10,7 +10,8 @@ from wrcore.contact.search import reduction
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.forces.drive import undriven
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 STRAIGHT = {"contact.creep.model": "she", "initial.y": 0.0, "initial.yaw": 0.0}
 

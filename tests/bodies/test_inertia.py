@@ -14,10 +14,11 @@ from tests.vehicle.conftest import TRAILER
 from wrcore.bodies.body import STATE_SIZE, euler_of
 from wrcore.bodies.inertia import inertia_tensors, principal, tensor_of
 from wrcore.equations.energy import energy_balance, energy_channels
-from wrcore.equations.equations_of_motion import workspace
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.vehicle.description import build_vehicle
 
 SIDES = np.array([4.0, 1.0, 2.5])

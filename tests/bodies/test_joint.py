@@ -11,7 +11,8 @@ from tests.equations.test_equations_of_motion import LEVEL, body_state, contact,
 from wrcore.bodies.body import STATE_SIZE, matrix_of
 from wrcore.bodies.joint import Joint, build_joints, evaluate_joints, joint_jacobian, joint_state
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 
 SPINS = np.array([0, 0, 1])

@@ -13,7 +13,8 @@ from tests.equations.test_equations_of_motion import body_state, contact, run  #
 from wrcore.bodies.body import STATE_SIZE, euler_parameters, matrix_of
 from wrcore.bodies.joint import Joint, evaluate_joints, joint_state
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 
 
 def some_markers(rng):

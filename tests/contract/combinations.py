@@ -7,7 +7,7 @@ import numpy as np
 import wrcore as wr
 from tests.conftest import ROOT
 from wrcore.equations.equations_of_motion import Equations
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 SCENE = ROOT / "config" / "scenes" / "suspended_wheelset.yaml"
 

@@ -10,12 +10,14 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.marker import FRAME
 from wrcore.contact.search import reduction
 from wrcore.equations.energy import CHANNELS, energy_balance, energy_channels
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.geometry.track import build_track
 from wrcore.integrate.integrator import integrate
 from wrcore.run.output.files import DESCRIPTIONS, load_run, unit_of, write_run
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.track import TrackModel
 
 IRREGULAR = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 15}}"

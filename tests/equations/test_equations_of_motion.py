@@ -10,12 +10,13 @@ from tests.conftest import ROOT
 from wrcore.bodies.body import euler_parameters
 from wrcore.bodies.joint import Joint, build_joints
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Bodies, Model
+from wrcore.equations.model import Bodies, Model
 from wrcore.forces.suspension import pack_elements
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import tangent_path
 from wrcore.integrate.integrator import integrate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.track import TrackModel
 
 LEVEL = TrackModel(True, tangent_path(), no_irregularity())

@@ -6,7 +6,7 @@ import pytest
 import wrcore as wr
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.interface import after_rejection, before_attempt, kept_size
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 
 def work_of(patch):

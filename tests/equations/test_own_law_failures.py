@@ -12,7 +12,7 @@ from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.own_law_failures import blame
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.kernels import own
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 LOST = {"law": f"{LAWS}lost_later", "outputs": ["left_2", "right_2"], "inputs": ["wheelset_2.y_m"], "parameters": [0.3]}
 

@@ -9,7 +9,8 @@ from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.run.checkpoints import model_fingerprint
-from wrcore.scene.description import compile_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import static_equilibrium
 from wrcore.vehicle.description import GRAVITY
 
 GUIDED = SCENES / "guided_car.yaml"

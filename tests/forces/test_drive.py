@@ -9,12 +9,13 @@ import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
 from tests.equations.test_equations_of_motion import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.equations.energy import energy_balance
-from wrcore.equations.equations_of_motion import Equations, state_size
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.many_models import with_kernels_of
+from wrcore.equations.model import state_size
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.forces.drive import BRAKE, GRIP, MOTOR, TIME, no_drive, undriven
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 from wrcore.track.schedule import pack_schedules, scheduled
 
 LOCOMOTIVE = SCENES / "locomotive.yaml"

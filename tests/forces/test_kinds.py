@@ -17,14 +17,14 @@ from tests.equations.test_equations_of_motion import body_state, contact, run  #
 from tests.forces import own_laws
 from tests.forces.test_suspension import at_rest, evaluate, model_with, moving
 from wrcore.equations.energy import energy_balance, energy_channels
-from wrcore.equations.equations_of_motion import workspace
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import GIVEN, read_yaml
 from wrcore.forces import kinds, law
 from wrcore.forces.kinds import KINDS
 from wrcore.kernels import own
 from wrcore.run.checkpoints import model_fingerprint
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 from wrcore.vehicle.element_parts import try_laws
 
 AIR, CATCH = 7.0, 3.0  # N s^2/m^2, N/m

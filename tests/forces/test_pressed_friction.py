@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 from tests.equations.test_equations_of_motion import contact  # noqa: F401 (a fixture)
 from tests.forces.test_suspension import at_rest, evaluate, model_with
 from wrcore.bodies.body import STATE_SIZE
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.forces.kinds.friction import FLOOR
 

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 from tests.bodies.test_body import matrix_of
 from tests.equations.test_equations_of_motion import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.bodies.body import STATE_SIZE
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.forces.kinds.friction import GIVING_WAY
 from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements

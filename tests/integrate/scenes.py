@@ -5,7 +5,8 @@ import yaml
 
 from tests.conftest import ROOT
 from tests.conftest import SCENES as EXAMPLES
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 BOX, ARM, BUSHING, RELAXATION = 1.0, 0.46, 1.7e7, 6e-5
 """Of `trailing_arm_car`, all chosen: mass (kg) and every moment (kg m^2) of an axle box, which make its radius of

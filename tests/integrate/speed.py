@@ -12,7 +12,8 @@ from tests.conftest import ELLIPTIC
 from tests.integrate.auto import BARS, Measured
 from tests.track.giving_track import EXAMPLES
 from wrcore.equations.equations_of_motion import Equations
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 SPECTRUM = {"spectrum": {"level": "low", "seed": 1, "length": 2000.0, "begin": 20.0}}
 ROUGH = {"track.irregularity": SPECTRUM}

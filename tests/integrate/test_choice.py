@@ -17,7 +17,8 @@ from wrcore.errors import InputError
 from wrcore.integrate import choice, engine
 from wrcore.integrate.integrator import Integration, integrate
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 ON_ITS_FLANGE = {"speed": 20, "initial.y": 6e-3}
 """The free wheelset: its equations, linearised where it begins, are damped; it bounces from flange to flange."""

@@ -8,7 +8,8 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.integrate.engine import NEXT, T
 from wrcore.integrate.integrator import integrate
 from wrcore.jacobian.moving_axes import carry, rates_of_increments
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 BODIES = 3
 

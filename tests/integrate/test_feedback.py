@@ -9,7 +9,8 @@ from wrcore.bodies.body import STATE_SIZE, rotation_matrix
 from wrcore.bodies.joint import evaluate_joints, joint_state
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.tableaus import EXPLICIT
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.track import track_poses
 
 PAPER = 5.0

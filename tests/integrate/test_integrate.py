@@ -17,7 +17,8 @@ from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.reference import SOLVERS, integrate_function
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulate import output_times, simulate, simulate_many
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas5": 5, "rodas4": 4, "rodas4p2": 4, "ros34pw2": 3}
 WHEELSET = ELLIPTIC / "suspended_wheelset.yaml"

@@ -13,7 +13,8 @@ from wrcore.integrate.integrator import METHODS, STALL_ATTEMPTS, integrate
 from wrcore.integrate.tableaus import ROSENBROCK
 from wrcore.integrate.tolerances import LENGTH, SHARE, lightness, step_tolerances
 from wrcore.run.simulation import evaluated
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 ROUGH = {"spectrum": {"level": "low", "seed": 1, "length": 300.0, "begin": 20.0}}
 TRACKS = {

@@ -9,7 +9,8 @@ from wrcore.jacobian.hertzian_wheel import differentiable
 from wrcore.jacobian.jacobian import new_jacobian
 from wrcore.jacobian.wheels import UNCOUNTED, _difference_wrenches, add_slopes, contact_blocks
 from wrcore.kernels.jit import jit
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.wheels.modes import ELLIPSES
 
 COUNT = 2000

@@ -8,12 +8,14 @@ import pytest
 from tests.conftest import ELLIPTIC
 from tests.forces.test_control import STEERING
 from wrcore.bodies.body import STATE_SIZE, matrix_of
-from wrcore.equations.equations_of_motion import Equations, internal_states
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import internal_states
 from wrcore.integrate.integrator import integrate
 from wrcore.jacobian.block_elimination import factorise, new_system, solve_stage
 from wrcore.jacobian.jacobian import joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
 from wrcore.jacobian.moving_axes import ANGLE, RATE, carry, rates_of_increments
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
 BRAKED = "drive.brakes=[{name: brake, bodies: [wheelset_2, bogie_1], force: {arc_length: [0, 90], force: [0, 9000]}}]"

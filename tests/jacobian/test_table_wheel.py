@@ -12,7 +12,8 @@ from wrcore.jacobian.jacobian import new_jacobian
 from wrcore.jacobian.table import look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.jacobian.wheels import UNCOUNTED, _difference_wrenches, add_slopes, contact_blocks
 from wrcore.kernels.jit import jit
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.wheels.modes import ELLIPSES
 from wrcore.wheels.table import cells as pair_cells
 from wrcore.wheels.table import lookup as pair_table

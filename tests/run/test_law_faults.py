@@ -11,7 +11,7 @@ import wrcore as wr
 from tests.conftest import ELLIPTIC
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 QUICK = {"contact.patch": "moment", "speed": 40.0, "initial.y": 0.003, "integration.duration": 0.1}

@@ -10,10 +10,12 @@ import pytest
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.contact.search.detection import detect
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 
 def test_conical_wheelset_follows_klingel():

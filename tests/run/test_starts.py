@@ -11,7 +11,8 @@ from wrcore.integrate.integrator import integrate
 from wrcore.run.output.files import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.streaming import simulate_to
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 SCENE = {"integration.duration": 0.05, "contact.creep.model": "she", "contact.patch": "moment",
          "integration.method": "ros34pw2"}  # fmt: skip

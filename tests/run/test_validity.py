@@ -8,7 +8,8 @@ from wrcore.cli import main
 from wrcore.contact.search import reduction
 from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS, WIDEST, WIDEST_TURN, exceeded, look_up_errors
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 RADIUS = 0.3
 

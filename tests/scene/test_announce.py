@@ -8,7 +8,8 @@ from tests.conftest import ELLIPTIC
 from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import told_if_long, warn_once
-from wrcore.scene import creep, description
+from wrcore.scene import compile as scene_compile
+from wrcore.scene import creep
 from wrcore.scene.creep import announce, creep_of
 from wrcore.scene.description import load_scene
 
@@ -64,11 +65,11 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
         raise Known
 
     said = []
-    monkeypatch.setattr(description, "tell", said.append)
-    monkeypatch.setattr(description, "_kept", known)
+    monkeypatch.setattr(scene_compile, "tell", said.append)
+    monkeypatch.setattr(scene_compile, "_kept", known)
     changes = {"contact.patch": "tabulated", "contact.detection": detection}
     with pytest.raises(Known):
-        description.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
+        scene_compile.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     assert len(said) == lines and all("contact.patch to moment" in line for line in said)
 
 
@@ -77,8 +78,8 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
 )
 def test_friction_that_falls_along_a_rail_is_announced_where_contact_is_looked_up(least, patch, lines, monkeypatch):
     said = []
-    monkeypatch.setattr(description, "tell", said.append)
+    monkeypatch.setattr(scene_compile, "tell", said.append)
     friction = {"left": 0.3, "right": {"arc_length": [10, 20], "mu": [0.3, least]}}
     changes = {"contact.patch": patch, "contact.friction": friction}
-    description.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
+    scene_compile.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     assert len(said) == lines and all("half" in line for line in said)

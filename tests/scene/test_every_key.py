@@ -25,8 +25,10 @@ from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run import simulation
 from wrcore.run.checkpoints import digest_of, model_fingerprint
 from wrcore.run.simulate import simulate
-from wrcore.scene import creep, description
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene import compile as scene_compile
+from wrcore.scene import creep
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.vehicle.description import build_vehicle
 
 SUSPENDED, VEHICLES = ELLIPTIC / "suspended_wheelset.yaml", ELLIPTIC.parent / "vehicles"
@@ -303,7 +305,7 @@ def record(monkeypatch, names):
     monkeypatch.setattr(creep, "ensure_table", instead)
     monkeypatch.setattr(creep, "load_table", instead)
     monkeypatch.setattr(creep, "kept_tables", lambda *_: ["a table"])
-    monkeypatch.setattr(description, "warn_of_rigid_rails", lambda *_: None)
+    monkeypatch.setattr(scene_compile, "warn_of_rigid_rails", lambda *_: None)
 
     def made(changes):
         asked.clear()

@@ -16,7 +16,7 @@ from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.kernels.named_laws import GROUP
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 MARKED = (
     "from pathlib import Path\nPath(__file__).with_name('ran').touch()\n\n\ndef law(s):\n    return {mu} + 0.0 * s\n"

@@ -13,7 +13,7 @@ from wrcore.creep.laws import GROUP
 from wrcore.errors import InputError
 from wrcore.kernels.handles import Kind
 from wrcore.run.checkpoints import model_fingerprint
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 LAWS = "tests/scene/own_laws.py:"

@@ -7,7 +7,7 @@ import pytest
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
 from wrcore.errors.checked_yaml import _schema, parse_value, read_yaml
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 TEXT = (ROOT / "reports" / "scenes.md").read_text(encoding="utf-8")
 BLOCKS = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)]

@@ -10,12 +10,15 @@ import yaml
 from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.cli import main
 from wrcore.contact.search.reduction import ANGLE, FY, NORMAL
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.geometry.profiles.standards import named_profile
-from wrcore.scene import description
-from wrcore.scene.description import GRAVITY, compile_scene, load_scene
+from wrcore.scene import compile as scene_compile
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
+from wrcore.vehicle.description import GRAVITY
 
 
 @pytest.fixture
@@ -294,7 +297,7 @@ def test_planar_detection_beside_a_lookup_table_is_told_what_to_set(monkeypatch)
     def tell(text):
         raise Told(text)
 
-    monkeypatch.setattr(description, "tell", tell)
+    monkeypatch.setattr(scene_compile, "tell", tell)
     changes = {"contact.patch": "tabulated", "contact.detection": "planar"}
     with pytest.raises(Told, match="set contact.patch to moment, or contact.detection to spatial"):
         compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))

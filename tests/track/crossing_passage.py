@@ -15,7 +15,8 @@ from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.analysis.pictures.style import save_figure
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 TRAILER = {
     "vehicle": {"model": "trailer_vehicle", "parameters": "vehicles/trailer_vehicle.yaml", "axle_boxes": False},

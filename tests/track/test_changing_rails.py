@@ -24,9 +24,10 @@ from wrcore.geometry.changing_rails.switch import Switch
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.changing_rails import BEGIN, interpolate, laid_at, with_own_arrays
-from wrcore.wheels.hertzian_force import SOLVED
+from wrcore.wheels.contact_model import SOLVED
 
 CROSSING = SCENES / "crossing.yaml"
 ROUND = {"wheel.profile": "cone:1/20", "rail": {"profile": "circle:0.3", "inclination": 0}, "initial.y": 0.0}

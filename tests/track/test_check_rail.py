@@ -13,7 +13,8 @@ from wrcore.errors import InputError
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.check_rail import CHORD, DOWN, STRIDE
 from wrcore.track.flexible_track import track_places
 

@@ -13,12 +13,14 @@ from wrcore.analysis.stability.stability import modes
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.contact.search.reduction import ETA, Y, Z
 from wrcore.equations.energy import energy_balance
-from wrcore.equations.equations_of_motion import Equations, internal_states
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import internal_states
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.kernels.jit import jit
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
 from wrcore.track import flexible_track
 from wrcore.track.flexible_track import RAILS, track_places
 

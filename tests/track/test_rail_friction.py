@@ -8,7 +8,7 @@ from tests.conftest import ELLIPTIC
 from wrcore.contact.search import reduction as columns
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 MODELS = {

@@ -9,11 +9,13 @@ import pytest
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.bodies.body import euler_of
 from wrcore.contact.search import reduction as columns
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import rotation
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 SAME = (columns.U_WHEEL, columns.U_RAIL, columns.ANGLE, columns.PENETRATION, columns.CURVATURE_Y)
 

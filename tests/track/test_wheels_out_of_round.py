@@ -26,7 +26,8 @@ from wrcore.geometry.changing_rails.slices import RailSlices
 from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.track.changing_rails import interpolate, laid_under, with_own_arrays
 
 MASS, LOAD, RADIUS = 906.5, 54546.0, 0.46  # half a wheelset

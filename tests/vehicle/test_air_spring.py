@@ -9,7 +9,8 @@ from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.forces.law import FIRST, LAST, NUMBERS
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
 from wrcore.vehicle.description import build_vehicle
 
 AREA, BAG, RESERVOIR = 0.25, 0.05, 0.08

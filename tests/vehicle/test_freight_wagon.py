@@ -8,7 +8,9 @@ from wrcore.equations.energy import energy_balance
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.forces.law import INNER, NUMBERS, PRESSING_SPRING
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
+from wrcore.vehicle.description import GRAVITY
 
 VEHICLES = ROOT / "config" / "vehicles"
 

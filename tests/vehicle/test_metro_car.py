@@ -6,7 +6,9 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
+from wrcore.vehicle.description import GRAVITY
 
 
 def test_seventeen_bodies_stand_evenly_on_eight_wheels():

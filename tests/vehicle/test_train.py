@@ -10,7 +10,8 @@ from wrcore.creep.laws import LAWS
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene, static_equilibrium
 from wrcore.track.track import TrackModel
 
 COUPLED = ["vehicle.count=3", "vehicle.spacing=26"]

@@ -19,7 +19,8 @@ from wrcore.contact.search.strip import make_pose
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.kernels.handles import Handle
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.wheels.motion import WheelMotion
 
 Y = 0.003

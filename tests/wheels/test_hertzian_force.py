@@ -9,8 +9,10 @@ from wrcore.contact.patch.model import strip_work
 from wrcore.contact.search import reduction as columns
 from wrcore.creep.laws import LAWS, creep_force
 from wrcore.geometry.track import rotation
-from wrcore.scene.description import compile_scene, load_scene
-from wrcore.wheels.hertzian_force import OUT_OF_RANGE, wheel_wrenches
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
+from wrcore.wheels.contact_model import OUT_OF_RANGE
+from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.motion import MOTION
 
 POSES = [  # side, y, roll, yaw: tread, both sides, and a flange contact

@@ -10,7 +10,8 @@ from wrcore.balance.linear import steady_running
 from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 CONES = {"wheel.profile": "cone:1/20", "rail.profile": "circle:0.3", "rail.inclination": 0}

@@ -25,7 +25,7 @@ from wrcore.contact.search.reduction import (
 from wrcore.creep.build import PSI_MAX
 from wrcore.errors import InputError
 from wrcore.kernels.handles import Handle
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 from wrcore.wheels import shaped_force as shaped_wheel
 from wrcore.wheels.hertzian_force import patch_wrench
 from wrcore.wheels.motion import WheelMotion

@@ -10,8 +10,9 @@ from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact.search import reduction as columns
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.kernels.jit import jit
-from wrcore.scene.description import compile_scene, load_scene
-from wrcore.wheels.hertzian_force import press_wheels
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
+from wrcore.wheels.force import press_wheels
 from wrcore.wheels.motion import MOTION
 from wrcore.wheels.surrogate_force import bounded, without_power
 

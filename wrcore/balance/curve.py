@@ -22,7 +22,8 @@ from wrcore.balance.linear import RANK, moved_states
 from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.bodies.marker import FRAME
 from wrcore.contact.search.reduction import MAX_PATCHES
-from wrcore.equations.equations_of_motion import Equations, independent_at, internal_states
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import independent_at, internal_states
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import PathData
 from wrcore.geometry.path_pieces import CANT_BASE, COLUMNS, CURVATURE, ROLL, WIDENING, X

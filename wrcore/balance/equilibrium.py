@@ -13,7 +13,8 @@ import numpy as np
 
 from wrcore.bodies.body import EULER, STATE_SIZE, VELOCITY
 from wrcore.contact.search import reduction
-from wrcore.equations.equations_of_motion import Equations, frictionless, internal_states
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import frictionless, internal_states
 from wrcore.forces.suspension import pack_elements
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path

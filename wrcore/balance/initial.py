@@ -19,8 +19,8 @@ from wrcore.contact.hertz import contact_modulus
 from wrcore.contact.rigid.height_at_load import settle
 from wrcore.contact.search import reduction
 from wrcore.contact.search.detection import axle_direction, find_patches
-from wrcore.equations.equations_of_motion import frictionless, independent_at, internal_states, state_size
 from wrcore.equations.many_models import equations_of
+from wrcore.equations.model import frictionless, independent_at, internal_states, state_size
 from wrcore.errors import InputError
 from wrcore.forces.drive import undriven
 from wrcore.geometry.path import frame_turn, track_frame

@@ -17,7 +17,8 @@ import numpy as np
 from wrcore.balance.equilibrium import RESIDUAL
 from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.bodies.joint import joint_jacobian
-from wrcore.equations.equations_of_motion import Equations, internal_states
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import internal_states
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""

@@ -25,13 +25,15 @@ import numpy as np
 from wrcore.bodies.body import OMEGA, STATE_SIZE, VELOCITY
 from wrcore.bodies.inertia import add_carried_gyroscopic, carrying, inertia_axes
 from wrcore.contact.search import reduction
-from wrcore.equations.equations_of_motion import Equations, derivatives_at, frictionless, independent_at, workspace
+from wrcore.equations.equations_of_motion import Equations, derivatives_at
+from wrcore.equations.model import frictionless, independent_at, workspace
 from wrcore.equations.outputs import drive_history
 from wrcore.forces.drive import BRAKE, KIND, undriven
 from wrcore.forces.suspension import element_energies, pack_elements
 from wrcore.kernels.jit import jit
 from wrcore.track.flexible_track import track_places
-from wrcore.wheels.hertzian_force import OUT_OF_RANGE, is_elliptic, normal_contact
+from wrcore.wheels.contact_model import OUT_OF_RANGE, is_elliptic
+from wrcore.wheels.hertzian_force import normal_contact
 
 CHANNELS = (
     "kinetic_J", "gravitational_J", "springs_J", "elastic_contact_J",

@@ -4,12 +4,14 @@ import threading
 
 import numpy as np
 
-from wrcore.equations.equations_of_motion import Equations, internal_states, looked_up, with_wheels, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.kernels import looked_up, with_wheels
+from wrcore.equations.model import internal_states, workspace
 from wrcore.forces.control import with_control_laws
 from wrcore.forces.law import LAW
 from wrcore.forces.suspension import with_laws
 from wrcore.kernels.handles import Kind, values_of
-from wrcore.wheels.hertzian_force import shaped
+from wrcore.wheels.contact_model import shaped
 
 
 def equations_of(model, shared=None):
@@ -47,7 +49,7 @@ def structure(model):
 
 def with_kernels_of(model, other):
     """The model with the addresses of another one of the same structure, from
-    `wrcore.equations.equations_of_motion.with_kernels`."""
+    `wrcore.equations.kernels.with_kernels`."""
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))

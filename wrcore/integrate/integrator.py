@@ -28,8 +28,9 @@ from dataclasses import replace
 import numpy as np
 from numba import typeof
 
-from wrcore.equations.equations_of_motion import Equations, state_size
+from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.interface import begin, kept_size, places, why_outside
+from wrcore.equations.model import state_size
 from wrcore.equations.own_law_failures import LawWatch, blame
 from wrcore.equations.pace import HALF_GAUGE, pace
 from wrcore.errors import InputError
@@ -44,7 +45,7 @@ from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.jacobian.block_elimination import new_system
 from wrcore.kernels.aside import planning
 from wrcore.kernels.told import reaching
-from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
+from wrcore.wheels.contact_model import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""

@@ -20,7 +20,7 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 import numpy as np
 
 from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.equations.equations_of_motion import internal_states
+from wrcore.equations.model import internal_states
 from wrcore.equations.pace import HALF_GAUGE
 from wrcore.integrate.tableaus import EXPLICIT
 from wrcore.track.flexible_track import RAILS, track_places

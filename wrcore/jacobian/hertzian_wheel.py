@@ -21,7 +21,9 @@ from wrcore.contact.search.moved import MOVES
 from wrcore.contact.search.strip import changes_along
 from wrcore.creep.laws import LAWS, creep_force_at
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import falling, is_elliptic, normal_ellipse
+from wrcore.wheels.contact_model import is_elliptic
+from wrcore.wheels.force import falling
+from wrcore.wheels.hertzian_force import normal_ellipse
 
 SLOPES = MOVES + 6
 """These, then velocity and angular velocity: rows of slopes."""

@@ -25,8 +25,9 @@ import numpy as np
 
 from wrcore.bodies.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.bodies.vector import copy_into, cross, dot
-from wrcore.equations.equations_of_motion import derivatives_at, state_size
+from wrcore.equations.equations_of_motion import derivatives_at
 from wrcore.equations.interface import turn_rate
+from wrcore.equations.model import state_size
 from wrcore.equations.pace import HALF_GAUGE, pace
 from wrcore.jacobian.flexible_track import hold_speeds, in_balance, without_mass
 from wrcore.jacobian.hertzian_wheel import differentiable, slope_scratch

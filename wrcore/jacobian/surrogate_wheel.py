@@ -17,7 +17,8 @@ from wrcore.contact.surrogate.network import run_network
 from wrcore.jacobian.hertzian_wheel import SAME, SLOPES
 from wrcore.jacobian.wheels import UNCOUNTED, direction_of, move_along
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import contact_of, detect_patches, leaning_motion
+from wrcore.wheels.contact_model import contact_of
+from wrcore.wheels.force import detect_patches, leaning_motion
 from wrcore.wheels.motion import motion_of
 from wrcore.wheels.normal_damping import Lift, lift_of
 from wrcore.wheels.surrogate_force import (

@@ -29,7 +29,8 @@ from wrcore.jacobian.hertzian_wheel import (
 from wrcore.jacobian.table import look_share_slopes_up, look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.jacobian.wheels import UNCOUNTED
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import contact_of, falling, press_wheels
+from wrcore.wheels.contact_model import contact_of
+from wrcore.wheels.force import falling, press_wheels
 from wrcore.wheels.modes import PATCHES_ONLY
 from wrcore.wheels.motion import as_left, motion_of
 from wrcore.wheels.normal_damping import lift_of, lift_share

@@ -24,7 +24,8 @@ from wrcore.jacobian.flexible_track import give_way, over_rails
 from wrcore.jacobian.hertzian_wheel import SAME, SLOPES, patch_slopes
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import contact_of, press_wheels
+from wrcore.wheels.contact_model import contact_of
+from wrcore.wheels.force import press_wheels
 from wrcore.wheels.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_ONLY
 from wrcore.wheels.motion import MOTION, motion_of
 

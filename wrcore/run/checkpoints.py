@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from wrcore.contact.normal.strips import MEMORY
-from wrcore.equations.equations_of_motion import Model
+from wrcore.equations.model import Model
 from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint

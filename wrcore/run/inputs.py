@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.equations.equations_of_motion import Model
+from wrcore.equations.model import Model
 from wrcore.forces import law
 from wrcore.forces.drive import COMMANDED, CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
 from wrcore.forces.kinds.actuator import given

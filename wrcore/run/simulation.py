@@ -15,7 +15,8 @@ import wrcore
 from wrcore.bodies.body import STATE_SIZE, angles, matrix_of
 from wrcore.contact.search import reduction
 from wrcore.equations.energy import energy_channels
-from wrcore.equations.equations_of_motion import Equations, Model, independent_at, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import Model, independent_at, workspace
 from wrcore.equations.outputs import check_rail_history, drive_history, evaluations_at, motion_history
 from wrcore.equations.own_law_failures import LawWatch
 from wrcore.errors import InputError
@@ -32,10 +33,11 @@ from wrcore.run.checks.validity import exceeded, look_up_errors
 from wrcore.run.output.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.output.run import Run
 from wrcore.run.state import State, from_state
-from wrcore.scene.description import Scene, compile_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import Scene
 from wrcore.track.flexible_track import track_places
 from wrcore.track.track import track_poses
-from wrcore.wheels.hertzian_force import is_elliptic, shaped
+from wrcore.wheels.contact_model import is_elliptic, shaped
 from wrcore.wheels.motion import MOTION
 
 DERAILED_Y = 0.05
@@ -86,7 +88,7 @@ class Simulation:
     (size,)) of the next stretch and the ``arc_lengths`` for its channels.
 
     InputError if it cannot begin there. ``progress`` wraps the patches of a creep table that has to be built,
-    ``shared`` is that of :func:`wrcore.scene.description.compile_scene`.
+    ``shared`` is that of :func:`wrcore.scene.compile.compile_scene`.
     """
 
     def __init__(

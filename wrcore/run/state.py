@@ -8,7 +8,7 @@ import numpy as np
 
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Model, state_size
+from wrcore.equations.model import Model, state_size
 from wrcore.errors import InputError
 from wrcore.geometry.path import arc_length_of
 from wrcore.vehicle.description import Vehicle

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import copy
-import json
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from os import PathLike
@@ -15,17 +14,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from wrcore.balance.bodies import check_bodies
-from wrcore.balance.initial import initial_state, rest
 from wrcore.balance.initial import static_equilibrium as static_equilibrium
 from wrcore.bodies.marker import FRAME
-from wrcore.contact.hertz import hertz_table
-from wrcore.contact.patch.model import strip_model
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
-from wrcore.contact.search.detection import DETECTIONS
-from wrcore.contact.search.reduction import MOMENT, REDUCTIONS
-from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
-from wrcore.creep.laws import LAWS, OWN
-from wrcore.equations.equations_of_motion import Model
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import read_source, validate
@@ -35,32 +26,25 @@ from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.named_laws import Laws
-from wrcore.kernels.told import tell
 from wrcore.scene.changes import changes_of, of_a_change, set_at
 from wrcore.scene.changing_rails import (
     LaidCrossing,
     read_corrugation,
     read_crossings,
-    seen_by_wheels,
-    warn_of_rigid_rails,
 )
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
-from wrcore.scene.creep import check_creep, creep_of
+from wrcore.scene.creep import check_creep
 from wrcore.scene.drive import read_drive
 from wrcore.scene.examples import examples_folder
 from wrcore.scene.friction import Friction, read_friction
 from wrcore.scene.out_of_round import read_out_of_round
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
 from wrcore.scene.stored import StoredScene, texts_in
-from wrcore.scene.support import check_support, track_support
+from wrcore.scene.support import check_support
 from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
-from wrcore.track.changing_rails import no_crossing
-from wrcore.track.track import TrackModel
-from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
-from wrcore.vehicle.element_parts import try_laws
+from wrcore.vehicle.description import Vehicle, vehicle_of
 from wrcore.vehicle.train import train_of
-from wrcore.wheels.hertzian_force import ContactModel
 
 
 @dataclass(frozen=True, repr=False)
@@ -284,104 +268,6 @@ def _with_points(track, folder, source):
     return {**track, "irregularity": {**irregularity, "points": found[0] if isinstance(points, str) else found}}
 
 
-LIKE_FRICTION = 0.8
-"""Of a rail's largest friction: where it falls below, it is said what looked-up contact errs by."""
-
-
 def friction_of(scene: Scene) -> Friction:
     """Friction of a scene's rails; a law of the user is called."""
     return read_friction(scene.data["contact"]["friction"], scene.source, scene.laws)
-
-
-def _allow_laws(scene):
-    """Call the laws of the elements of a scene for a test, unless the scene is one whose laws may not be run."""
-    try:
-        scene.laws.allow()
-    except InputError as error:
-        raise InputError(scene.source, error.field, error.expected) from None
-    with scene.laws.present():
-        try_laws(scene.vehicle.data["elements"], scene.vehicle.source_file)
-    return True
-
-
-def compile_scene(
-    scene: Scene,
-    progress: Callable | None = None,
-    shared: dict[Any, Any] | None = None,
-    meanwhile: Callable[[Model], AbstractContextManager] = nullcontext,
-) -> tuple[Model, np.ndarray]:
-    """A scene's model, as kernels take it, and its initial state (13 n,): wheelsets at rest on the rails vertically and
-    in roll, rolling forward without slip.
-
-    ``progress`` wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``. ``shared`` keeps what
-    does not change from one scene of a series to the next (contact geometry, creep table, static equilibrium); it knows
-    vehicles, profiles and tracks by their identity. ``meanwhile`` makes of the model a context for what follows on it.
-    """
-    shared = {} if shared is None else shared
-    data, vehicle = scene.data, scene.vehicle
-    contact, integration = data["contact"], data["integration"]
-    material, damping = contact["material"], contact["normal"]["damping"]
-    changing = scene.crossings, scene.out_of_round, scene.corrugation
-    if contact["patch"] == "tabulated" and scene.detection != "spatial":
-        tell(
-            f"{scene.source}: contact.detection {scene.detection} beside contact.patch tabulated: each patch is solved,"
-            " some hundred times as slow as the table; set contact.patch to moment, or contact.detection to spatial"
-        )
-    _kept(shared, "laws", (vehicle, scene.laws), lambda: _allow_laws(scene))
-    track = _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
-    parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # known by their identity
-    friction = friction_of(scene)
-    if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
-        tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
-             "largest one by 2 to 3 % of mu N, at a sixth by 14 to 19; contact.patch exact does not")  # fmt: skip
-    geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
-    geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
-    pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
-    if any(changing):
-        starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
-        geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(*changing, pairs, starts))
-        geometry, plain = geometries[0], tuple(pair.geometry for pair in pairs)  # of the type of all
-        if "support" not in data["track"]:
-            warn_of_rigid_rails(scene.source)
-    support, elements = track_support(
-        data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
-    )
-    model = Model(
-        vehicle.bodies,
-        ContactModel(
-            geometry, hertz_table(), LAWS.get(contact["creep"]["model"], OWN),
-            _kept(shared, "creep", (*contact["creep"].values(), *material.values()),
-                  lambda: creep_of(scene, progress)),
-            DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
-            REDUCTIONS.get(contact["patch"], MOMENT),
-            float(material["shear_modulus"]), float(material["poisson_ratio"]), friction.largest,
-            float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
-            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"],
-                        friction.largest),
-            friction.ratio, friction.decay,
-            geometries, plain, friction_factors=friction.factors,
-            surrogate=load_surrogate() if contact["patch"] == "surrogate" else no_surrogate(),
-        ),
-        elements, vehicle.joints,
-        TrackModel(bool(track.tangent), track.path, track.irregularity),
-        float(data["speed"]), GRAVITY,
-        float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, flexible_track=support,
-        drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
-        controls=read_controls(data, vehicle, scene.laws, scene.source), crossing=crossing,
-        check_rails=read_check_rails(data, pairs, scene.source),
-    )  # fmt: skip
-    decisive = (
-        parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
-        *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
-    )  # fmt: skip
-    with meanwhile(model):
-        at_rest = _kept(shared, "rest", decisive, lambda: rest(scene, model))
-        return model, initial_state(scene, model, at_rest, shared)
-
-
-def _kept(shared, name, key, make):
-    """The part of a name that was made for a key before, or is made now."""
-    if (name, key) not in shared:
-        shared[name, key] = make()
-    return shared[name, key]

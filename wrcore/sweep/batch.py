@@ -38,7 +38,8 @@ from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y, counters_of
 from wrcore.scene.changes import with_value
-from wrcore.scene.description import Scene, changed_by_file, compile_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import Scene, changed_by_file
 from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
 from wrcore.sweep.measures import COUNTERS, FORCES, MOTION, Motions, wheel_forces, wheelset_motion
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts

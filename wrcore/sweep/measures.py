@@ -32,7 +32,7 @@ import numpy as np
 
 from wrcore.bodies.body import STATE_SIZE, angles
 from wrcore.contact.search import reduction
-from wrcore.equations.equations_of_motion import Model
+from wrcore.equations.model import Model
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.output.derived import UNLOADED, creep_work

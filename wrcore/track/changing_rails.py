@@ -40,7 +40,7 @@ from wrcore.contact.search.strip import LEAN as LEAN_AHEAD
 from wrcore.kernels.jit import FUSED, jit
 from wrcore.track.flexible_track import displacement
 from wrcore.track.track import arc_length_at
-from wrcore.wheels.hertzian_force import contact_of
+from wrcore.wheels.contact_model import contact_of
 from wrcore.wheels.motion import MOTION, motion_of
 
 TRAVEL = 0.02

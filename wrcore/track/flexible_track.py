@@ -31,7 +31,8 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.vector import copy_into
 from wrcore.contact.search.reduction import COSINE, ETA, FX, FY, NORMAL, SINE, Y, Z
 from wrcore.kernels.jit import jit
-from wrcore.wheels.hertzian_force import COUNTERS, press_wheels
+from wrcore.wheels.contact_model import COUNTERS
+from wrcore.wheels.force import press_wheels
 from wrcore.wheels.modes import BARE, ELLIPSES, PATCHES_HELD, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.wheels.motion import MOTION
 

@@ -8,7 +8,7 @@ import numpy as np
 from wrcore.bodies.inertia import principal, tensor_of
 from wrcore.bodies.joint import Joint, Joints, build_joints
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Bodies
+from wrcore.equations.model import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.forces.suspension import PRELOAD, Elements

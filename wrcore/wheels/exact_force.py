@@ -21,7 +21,8 @@ from wrcore.contact.search.detection import SPATIAL
 from wrcore.contact.search.strip import LIFT, leaning, make_pose, upright, with_rail_along
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID, contact_of, detect_patches, falling, leaning_motion
+from wrcore.wheels.contact_model import ON_FIXED, ON_GRID, contact_of
+from wrcore.wheels.force import detect_patches, falling, leaning_motion
 from wrcore.wheels.modes import BARE, ELLIPSES, FRESH, PATCHES_ONLY, WARM
 from wrcore.wheels.motion import as_left, motion_of
 from wrcore.wheels.normal_damping import lift_of, lifted

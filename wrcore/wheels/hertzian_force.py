@@ -1,92 +1,17 @@
 """Wrench of the rails on a wheelset: detection, Hertz, creepages and creep force put together."""
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.hertz import HertzTable, loaded_ellipse
-from wrcore.contact.patch.model import StripModel
+from wrcore.contact.hertz import loaded_ellipse
 from wrcore.contact.search import reduction
-from wrcore.contact.search.detection import AUTO, SPATIAL, find_patches, planar_error_bound
-from wrcore.contact.search.geometry import ContactGeometry
 from wrcore.contact.search.strip import changes_along, lean_at, leaning, upright
-from wrcore.contact.surrogate.network import Surrogate, no_surrogate
-from wrcore.creep.laws import LAWS, CreepData, creep_force_at
-from wrcore.kernels.handles import call_address, other_at
+from wrcore.creep.laws import creep_force_at
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.wheels.contact_model import OUT_OF_RANGE, contact_of
+from wrcore.wheels.force import detect_patches, falling, leaning_motion
 from wrcore.wheels.modes import FRESH, PATCHES_HELD, PATCHES_ONLY
-from wrcore.wheels.motion import MOTION, WheelMotion, motion_of
-
-EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
-"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
-pair's table that were solved instead of looked up, patches on fixed strips, whose tips were not found, and patches of
-the surrogate far outside the range of its training."""
-
-COUNTERS = 6
-
-
-class ContactModel(NamedTuple):
-    """Everything that turns a wheelset's motion into contact forces, for kernels."""
-
-    geometry: ContactGeometry
-    hertz: HertzTable
-    law: int  # creep law, see wrcore.creep.laws.LAWS
-    creep: CreepData
-    detection: int  # PLANAR, SPATIAL or AUTO of wrcore.contact.search.detection
-    detection_tolerance: float  # AUTO: normal penetration that planar detection may miss, m
-    reduction: int  # MAXIMUM or MOMENT of wrcore.contact.search.reduction
-    shear_modulus: float  # G, Pa
-    poisson_ratio: float
-    friction: float
-    """Coulomb's mu at no slip; of rails that differ, or along which it changes, the largest one."""
-    damping: float  # c_e of Eq. (7)'s damping factor; 1 means none
-    damping_speed: float  # v0 of the damping factor, m/s
-    least_speed: float  # rolling speed is not taken smaller than this in creepages, m/s
-    strips: StripModel  # patches on strips, if the scene asks for them
-    friction_ratio: float = 1.0  # A: friction at large slip velocity over that at none; 1: it does not fall
-    friction_decay: float = 0.0  # B: rate at which friction falls with slip velocity, s/m
-    geometries: tuple = ()
-    """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
-    plain: tuple = ()
-    """Where rails change along the track: the `ContactGeometry` of each wheel where they do not."""
-    wheels: np.ndarray = np.zeros(0, np.int64)
-    """The same as `Handles` of contact models, see `wrcore.equations.equations_of_motion.with_wheels`."""
-    friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
-    surrogate: Surrogate = no_surrogate()
-    """Trained network of exact contact, if the scene asks for it."""
-
-
-def alone(contact, **more):
-    """A `ContactModel` without what its wheels have of their own, and ``more`` in it."""
-    return contact._replace(geometries=(), plain=(), wheels=np.zeros(0, np.int64), **more)
-
-
-@jit(allocates=False, inline="always")
-def contact_of(model, wheelset, wheel):
-    """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
-    return other_at(model, model.wheels[2 * wheelset + wheel] if len(model.wheels) > 0 else 0)
-
-
-@jit(allocates=False, forceinline=True)
-def press_wheels(model, work, mode):
-    """Find the wrenches of the rails on all wheels for their motions in ``work``, by the model's kernel."""
-    call_address(
-        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips, mode,
-    )  # fmt: skip
-
-
-@jit(allocates=False, forceinline=True)
-def is_elliptic(contact):
-    """Whether the patches of a `ContactModel` are ellipses."""
-    return not contact.strips.strips and len(contact.surrogate.median) == 0
-
-
-def shaped(contact):
-    """Whether a `ContactModel` asks for the shape numbers of its patches."""
-    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and is_elliptic.py_func(contact)
+from wrcore.wheels.motion import MOTION, motion_of
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -103,48 +28,6 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
     """Normal force (N) by Eq. (7) and the semi-axes (m) of the Hertz ellipse that carries it."""
     force, a, b, _, _ = normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed)
     return force, a, b
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def detect_patches(model, m, rows):
-    """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
-    detection was spatial."""
-    bound, spatial = 0.0, model.detection == SPATIAL
-    ex, ey, ez = m.side * m.ex, m.side * m.ey, m.side * m.ez
-    if model.detection == AUTO:
-        bound = planar_error_bound(model.geometry, m.side, m.y, m.z, ex, ey, ez)
-        spatial = bound > model.detection_tolerance
-    count = find_patches(model.geometry, m.side, m.y, m.z, ex, ey, ez, spatial, model.reduction, rows)
-    return count, bound, spatial
-
-
-@jit(allocates=False, forceinline=True)
-def falling(model, friction, xi, eta, speed):
-    """Coefficient of friction mu0 ((1 - A) exp(-B w) + A) at the slip velocity w of a patch (Polach, Wear 258 (2005)
-    992): that of its reference point, without spin; or mu0 times a factor of a user's own, samples of which lie 1/B
-    apart."""
-    ratio = model.friction_ratio
-    if ratio == 1.0:
-        return friction
-    slip = speed * math.sqrt(xi * xi + eta * eta)
-    factors = model.friction_factors
-    if factors.shape[0] > 0:
-        place = min(slip * model.friction_decay, factors.shape[0] - 1.001)
-        k = int(place)
-        return friction * (factors[k] + (place - k) * (factors[k + 1] - factors[k]))
-    return friction * ((1.0 - ratio) * math.exp(-model.friction_decay * slip) + ratio)
-
-
-@jit(allocates=False, forceinline=True)
-def leaning_motion(geometry, m, lean):
-    """The motion with velocities in axes that lean so, see `lean_at`."""
-    if not changes_along(geometry):
-        return m
-    vx, vz = leaning(geometry, lean, m.vx, m.vz)
-    wx, wz = leaning(geometry, lean, m.wx, m.wz)
-    return WheelMotion(
-        m.side, m.y, m.z, m.ex, m.ey, m.ez, vx, m.vy, vz, wx, m.wy, wz, m.bend_y, m.bend_z, m.friction
-    )  # fmt: skip
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

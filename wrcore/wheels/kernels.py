@@ -13,8 +13,9 @@ from wrcore.contact.search.reduction import PATCH_COLUMNS
 from wrcore.contact.search.strip import Pose
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of
 from wrcore.kernels.told import handed_on, interrupted, told_if_long
+from wrcore.wheels.contact_model import COUNTERS, alone
 from wrcore.wheels.exact_force import add_group
-from wrcore.wheels.hertzian_force import COUNTERS, alone, wheel_wrenches
+from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.modes import FRESH
 from wrcore.wheels.motion import MOTION, WheelMotion
 from wrcore.wheels.normal_damping import Lift

@@ -20,7 +20,9 @@ from wrcore.contact.search.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHE
 from wrcore.contact.search.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.wheels.hertzian_force import OUT_OF_RANGE, contact_of, detect_patches, leaning_wrench
+from wrcore.wheels.contact_model import OUT_OF_RANGE, contact_of
+from wrcore.wheels.force import detect_patches
+from wrcore.wheels.hertzian_force import leaning_wrench
 from wrcore.wheels.modes import FRESH
 from wrcore.wheels.motion import motion_of
 

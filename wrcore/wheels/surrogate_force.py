@@ -30,15 +30,9 @@ from wrcore.contact.surrogate.network import force_remainder, run_network
 from wrcore.contact.surrogate.strips import close_strips, fill_strips, lift_strips, press_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.wheels.contact_model import OUT_OF_RANGE, OUTSIDE_TRAINING, contact_of
 from wrcore.wheels.exact_force import copy_deepest, mirror
-from wrcore.wheels.hertzian_force import (
-    OUT_OF_RANGE,
-    OUTSIDE_TRAINING,
-    contact_of,
-    detect_patches,
-    falling,
-    leaning_motion,
-)
+from wrcore.wheels.force import detect_patches, falling, leaning_motion
 from wrcore.wheels.modes import FRESH, PATCHES_ONLY
 from wrcore.wheels.motion import WheelMotion, as_left, motion_of
 from wrcore.wheels.normal_damping import lift_of

@@ -20,8 +20,9 @@ from wrcore.contact.search.reduction import MAX_PATCHES
 from wrcore.contact.search.strip import changed_here, make_pose
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.wheels.contact_model import OUT_OF_RANGE, SOLVED
 from wrcore.wheels.exact_force import ROWLESS, UNSOLVED, copy_deepest
-from wrcore.wheels.hertzian_force import OUT_OF_RANGE, SOLVED, falling
+from wrcore.wheels.force import falling
 from wrcore.wheels.normal_damping import lift_of
 from wrcore.wheels.table import lookup as columns
 from wrcore.wheels.table.cells import locate

@@ -23,7 +23,8 @@ from wrcore.analysis.stability.stability import at_speed
 from wrcore.errors import InputError
 from wrcore.run.motion import amplitude
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 HOPF = 50.0
 """Speed at which the oscillator below loses its stability, m/s."""

@@ -17,7 +17,8 @@ from wrcore.analysis.stability.stability import (
 )
 from wrcore.balance.linear import DIRECTIONS
 from wrcore.errors import InputError
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 
 @pytest.fixture(scope="module")

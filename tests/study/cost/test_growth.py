@@ -10,7 +10,8 @@ from tests.conftest import ELLIPTIC
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate, simulate_many
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 SHORT = ["integration.duration=0.2"]
 

@@ -11,7 +11,8 @@ from study.cost.stages import search_all
 from tests.conftest import ELLIPTIC
 from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.kernels.handles import Handle
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,8 @@ from tests.conftest import ELLIPTIC
 from wrcore.contact.search import strip
 from wrcore.contact.search.detection import find_patches
 from wrcore.equations import equations_of_motion as system
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.scene.description import load_scene
 
 

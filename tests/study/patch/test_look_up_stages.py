@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from study.patch.look_up_stages import FORCE, SEARCH, STATES, costs, one_by_one, up_to, wheels_of
+from wrcore.wheels.contact_model import COUNTERS
 from wrcore.wheels.exact_force import strip_wrenches
-from wrcore.wheels.hertzian_force import COUNTERS
 
 SCENE = "suspended_wheelset", {"integration.duration": 0.5, "speed": 60.0}
 

@@ -8,7 +8,8 @@ import pytest
 import wrcore as wr
 from wrcore.contact.patch.model import NO_TABLE, NODES, NUMBERS, SHARES
 from wrcore.jacobian.table import look_share_slopes_up
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.wheels.table import cells as pair_cells
 from wrcore.wheels.table import solver as pair_solver
 from wrcore.wheels.table import store as pair_store

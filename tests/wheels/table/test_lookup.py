@@ -26,7 +26,8 @@ from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.integrate.integrator import integrate
 from wrcore.run.checks.validity import LOOK_UP_ERRORS, look_up_errors
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.wheels import kernels as patch_kernels
 from wrcore.wheels import modes
 from wrcore.wheels.motion import WheelMotion

@@ -6,7 +6,8 @@ import pandas as pd
 
 from study.cost.chains import over_chains
 from study.cost.growth import cache_sizes, findings, over_runs, over_scenes, over_wheelsets
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 scenes, settings, output = snakemake.params.scenes, snakemake.params.settings, snakemake.output

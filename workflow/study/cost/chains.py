@@ -8,7 +8,7 @@ from study.cost.timing import summary, take_turns
 from wrcore.bodies.body import euler_parameters
 from wrcore.bodies.joint import Joint, build_joints
 from wrcore.bodies.marker import FRAME
-from wrcore.equations.equations_of_motion import Bodies
+from wrcore.equations.model import Bodies
 from wrcore.forces.suspension import pack_elements
 
 STATES = 16

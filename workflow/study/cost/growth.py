@@ -8,10 +8,11 @@ import pandas as pd
 
 from study.cost.recorded import evaluation, record
 from study.cost.timing import Contender, summary, take_turns
-from wrcore.equations.equations_of_motion import workspace
+from wrcore.equations.model import workspace
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import output_times, simulate_many
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 BEYOND_ARITHMETIC = 1.25
 """Time per evaluation and wheelset, over its least value, from which on something else than arithmetic is paid for."""

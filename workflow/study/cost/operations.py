@@ -14,7 +14,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from wrcore.bodies import joint_forces as constraints
-from wrcore.equations.equations_of_motion import workspace
+from wrcore.equations.model import workspace
 from wrcore.forces.law import LAW, LAWS
 from wrcore.wheels import hertzian_force as wheel
 

@@ -23,7 +23,8 @@ from wrcore.creep.laws import LAWS
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
 from wrcore.run.simulate import output_times
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 BOXES = {"in the wheelsets": "false", "bodies on joints": "true"}
 """Settings of ``vehicle.axle_boxes``."""

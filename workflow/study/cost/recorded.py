@@ -8,10 +8,11 @@ import numpy as np
 
 from study.cost.timing import Contender
 from wrcore.bodies.body import STATE_SIZE
-from wrcore.equations.equations_of_motion import Equations, Model, fill_many
+from wrcore.equations.equations_of_motion import Equations, fill_many
+from wrcore.equations.model import Model
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 LASTING = 5e-3
 """Processor time of a timed call, s: a thousand times what a call from Python into compiled code costs."""

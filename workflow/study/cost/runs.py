@@ -11,7 +11,8 @@ import pandas as pd
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import output_times, simulate_many
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 from wrcore.sweep.batch import run_sweep
 from wrcore.sweep.plan import load_sweep
 

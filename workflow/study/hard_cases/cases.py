@@ -22,7 +22,8 @@ from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 COLUMNS = (
     "family", "case", "condition", "vehicle", "detection", "integrator", "outcome", "status", "reason", "simulated_s",

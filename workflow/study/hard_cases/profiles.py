@@ -9,7 +9,7 @@ from study.hard_cases.cases import Check, contacts, impulse_error, prepare, refu
 from wrcore.contact.search import reduction
 from wrcore.errors import InputError
 from wrcore.geometry.profiles.profile import ProfileCurve
-from wrcore.scene.description import compile_scene
+from wrcore.scene.compile import compile_scene
 
 IMPULSE_ERROR = 1e-3
 """Of the load's impulse: forces sampled at the output rate are integrated to about this."""

@@ -6,7 +6,8 @@ import pandas as pd
 from study.cost.recorded import evaluation, record
 from study.cost.timing import QUARTILES, take_turns
 from wrcore.equations.equations_of_motion import Equations
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 
 def patches_per_evaluation(recorded):

@@ -17,7 +17,7 @@ from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search import reduction
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.profiles.standards import named_profile
-from wrcore.wheels.hertzian_force import SOLVED
+from wrcore.wheels.contact_model import SOLVED
 from wrcore.wheels.table.store import pair_of
 
 SPEED, FRICTION = 20.0, 0.3

@@ -22,9 +22,12 @@ from wrcore.equations.equations_of_motion import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
+from wrcore.wheels.contact_model import COUNTERS
 from wrcore.wheels.exact_force import strip_wrenches
-from wrcore.wheels.hertzian_force import COUNTERS, detect_patches, wheel_wrenches
+from wrcore.wheels.force import detect_patches
+from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.modes import FRESH
 from wrcore.wheels.motion import as_left, motion_of
 from wrcore.wheels.normal_damping import lift_of

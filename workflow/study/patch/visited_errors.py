@@ -23,8 +23,9 @@ from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, STRIPS
 from wrcore.contact.search import reduction
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.integrate.integrator import integrate
-from wrcore.scene.description import compile_scene, load_scene
-from wrcore.wheels.hertzian_force import OUTSIDE_TRAINING, SOLVED
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
+from wrcore.wheels.contact_model import OUTSIDE_TRAINING, SOLVED
 
 
 def curved_track(radius, cant):

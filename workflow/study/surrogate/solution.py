@@ -29,7 +29,7 @@ from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
-from wrcore.wheels.hertzian_force import alone
+from wrcore.wheels.contact_model import alone
 from wrcore.wheels.surrogate_force import (
     _MOST_ANGLE,
     _MOST_LOG_AXIS,

@@ -21,7 +21,8 @@ from wrcore.errors.checked_calls import OneOf, Within, checked, same_shape
 from wrcore.geometry.track import SIDES
 from wrcore.run.checks.validity import flags
 from wrcore.run.output.run import Channels
-from wrcore.wheels.hertzian_force import COUNTERS, wheel_wrenches
+from wrcore.wheels.contact_model import COUNTERS
+from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.motion import MOTION as _MOTION
 
 MOTION: Any = _MOTION  # columns of motions

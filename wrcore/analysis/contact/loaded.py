@@ -33,8 +33,9 @@ from wrcore.creep.table import ensure_table
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.handles import Handle
+from wrcore.wheels.contact_model import COUNTERS, ON_FIXED, ON_GRID, ContactModel
 from wrcore.wheels.exact_force import group_wrench, mirror
-from wrcore.wheels.hertzian_force import COUNTERS, ON_FIXED, ON_GRID, ContactModel, wheel_wrenches
+from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.kernels import with_fallback, with_late
 from wrcore.wheels.motion import MOTION, WheelMotion, as_left
 from wrcore.wheels.surrogate_force import surrogate_wrenches

@@ -12,7 +12,7 @@ from wrcore.contact.search.surfaces import ContactPlane, surface_gap
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.run.checks.shape_along import ROUGH
-from wrcore.wheels.hertzian_force import ON_FIXED, ON_GRID
+from wrcore.wheels.contact_model import ON_FIXED, ON_GRID
 
 MODELS = ("maximum", "moment", "exact", "grid")
 """Patch models that serve rails which change along the track."""

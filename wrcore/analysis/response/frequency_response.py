@@ -21,7 +21,7 @@ from wrcore.analysis.stability.stability import growth, rising, steady_motion
 from wrcore.balance.linear import Linearisation, accelerations, moved_states
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.inertia import inertia_tensors
-from wrcore.equations.equations_of_motion import Model, internal_states
+from wrcore.equations.model import Model, internal_states
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.forces.drive import undriven

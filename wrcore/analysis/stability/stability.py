@@ -17,7 +17,8 @@ from wrcore.errors.checked_calls import checked
 from wrcore.forces.drive import undriven
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import tangent_path
-from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
 from wrcore.track.track import TrackModel
 
 LARGEST_REST = 1e-3

@@ -25,7 +25,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.told import PATIENCE, handed_on, interrupted, reached_so_far, tell, told_if_long, warn_once
-from wrcore.wheels.hertzian_force import alone
+from wrcore.wheels.contact_model import alone
 from wrcore.wheels.table.cells import (
     BESIDE,
     FINER,

@@ -13,12 +13,14 @@ from wrcore.contact.hertz import contact_modulus, hertz_shape
 from wrcore.contact.rigid.height_at_load import settle
 from wrcore.creep.laws import LAWS, creep_data, creep_force
 from wrcore.creep.table import ensure_table
-from wrcore.equations.equations_of_motion import Equations, workspace
+from wrcore.equations.equations_of_motion import Equations
+from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
-from wrcore.scene.description import compile_scene, load_scene
+from wrcore.scene.compile import compile_scene
+from wrcore.scene.description import load_scene
 
 LOAD, LEVER = 54546.0, 0.75
 """Wheel load (N) and tape circle (m): what differences of force and moment are measured by."""

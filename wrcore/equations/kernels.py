@@ -1,0 +1,91 @@
+"""Which kernels a model runs: only what a scene has is compiled, and called by its address."""
+
+import numpy as np
+
+from wrcore.bodies.joint_forces import add_reactions
+from wrcore.forces.control import with_controls
+from wrcore.forces.drive import add_drive
+from wrcore.forces.suspension import with_laws
+from wrcore.kernels.handles import Handles, Kernel, Kind
+from wrcore.track.changing_rails import lay_sections, shorten_step, with_own_arrays
+from wrcore.track.check_rail import press_check_rails, shorten_beside
+from wrcore.track.flexible_track import flexible_wrenches
+from wrcore.track.track import fill_rail_friction
+from wrcore.wheels.contact_model import alone, shaped
+from wrcore.wheels.hertzian_force import wheel_wrenches
+from wrcore.wheels.modes import FRESH
+
+
+def looked_up(model):
+    """Coefficients of friction at which contact on the left and on the right rail is looked up: the largest ones; 0
+    where it is not."""
+    strips, friction = model.contact.strips, model.friction
+    if not strips.looked_up or not len(friction.points):
+        return [strips.looked_up] * 2
+    return [float(rail[:, 1].max()) for rail in np.split(friction.points, friction.starts[1:-1])]
+
+
+def with_wheels(model):
+    """Contact of a model with what each wheel runs on where they differ, and with what its patches need."""
+    contact, of_rails = model.contact, looked_up(model)
+    if contact.geometries or of_rails[0] != of_rails[1]:
+        wheels, bare = [], alone(contact)
+        for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
+            strips = contact.strips._replace(looked_up=of_rails[k % 2])
+            if strips.looked_up and contact.plain:
+                from wrcore.wheels.table.store import with_pair
+
+                strips = with_pair(bare._replace(geometry=contact.plain[k], strips=strips)).strips
+            geometry = with_own_arrays(geometry) if len(model.crossing.tables) else geometry
+            wheels.append(bare._replace(geometry=geometry, strips=strips))
+        contact = bare._replace(wheels=np.asarray(Handles(wheels)))
+    if contact.strips.strips:
+        from wrcore.wheels.kernels import with_late
+
+        contact = with_late(contact)
+    return contact
+
+
+def with_kernels(model, work):
+    """The model with the addresses of the kernels of its wheels, elements, joints and so on: only what it runs is
+    compiled."""
+    wrenches, contact = wheel_wrenches, model.contact
+    if contact.strips.strips and len(work.motions):
+        from wrcore.wheels.exact_force import strip_wrenches
+        from wrcore.wheels.kernels import with_groups
+
+        wrenches, contact = strip_wrenches, with_groups(contact, work.strips)
+    elif len(contact.surrogate.median):
+        from wrcore.wheels.surrogate_force import surrogate_wrenches
+
+        wrenches = surrogate_wrenches
+    elif shaped(contact):
+        from wrcore.wheels.shaped_force import shaped_wrenches
+
+        wrenches = shaped_wrenches
+    # what follows is compiled for the model as it will be
+    model = model._replace(contact=with_wheels(model._replace(contact=contact)), elements=with_laws(model.elements))
+    kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
+    if model.joints.equations:
+        kernels["reactions"] = Kernel(add_reactions, kind, 0.0, state, scratch)
+    if len(model.controls.rows):
+        model, own = with_controls(model, kind, scratch, state)
+        kernels |= own
+    elif len(model.drive.rows):
+        kernels["torques"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
+    if len(model.friction.points):
+        kernels["rail_friction"] = Kernel(fill_rail_friction, kind, state, scratch)
+    if len(model.crossing.tables):
+        kernels["sections"] = Kernel(lay_sections, kind, state, scratch)
+        kernels["strides"] = Kernel(shorten_step, kind, state, scratch, state, 0)
+    if len(model.check_rails.rows):
+        kernels["guards"] = Kernel(press_check_rails, kind, state, scratch)
+        kernels["strides"] = Kernel(shorten_beside, kind, state, scratch, state, 0)
+    if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
+        kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
+    if len(model.bodies.wheelsets):
+        kernels["wheels"] = Kernel(
+            wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+            work.counters, Kind(work.strips), FRESH,
+        )  # fmt: skip
+    return model._replace(**{name: getattr(kernel, "address", kernel) for name, kernel in kernels.items()})

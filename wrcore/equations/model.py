@@ -1,0 +1,140 @@
+"""A compiled scene for kernels, its scratch arrays, and the size of its state."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.bodies.body import STATE_SIZE
+from wrcore.bodies.joint import Joints
+from wrcore.bodies.joint_forces import ConstraintWork, constraint_workspace
+from wrcore.contact.changing_rails.section_table import ROWS
+from wrcore.contact.patch.model import StripWork, strip_work
+from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.creep.laws import LAWS
+from wrcore.forces.control import Controls, ControlWork, control_work, no_controls
+from wrcore.forces.drive import Drive, no_drive
+from wrcore.forces.suspension import Elements
+from wrcore.kernels.jit import jit
+from wrcore.track.changing_rails import KNOWN, Crossing, no_crossing
+from wrcore.track.check_rail import CheckRails, no_check_rails
+from wrcore.track.flexible_track import FlexibleTrack, FlexibleTrackWork, rigid_track, track_work
+from wrcore.track.schedule import Schedules, pack_schedules
+from wrcore.track.track import TrackModel
+from wrcore.wheels.contact_model import COUNTERS, ContactModel
+from wrcore.wheels.motion import MOTION
+
+FRICTIONLESS = 1e-9
+"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
+
+
+class Bodies(NamedTuple):
+    """Rigid bodies, for kernels."""
+
+    mass: np.ndarray  # (n,), kg
+    inertia: np.ndarray  # (n, 3): principal moments, kg m^2, about the body's x, y, z axes unless ``axes`` are given
+    spins: np.ndarray  # (n,) int: 1 for a body of revolution about its y axis whose frame does not spin along
+    wheelsets: np.ndarray  # (k,) int: bodies with wheels
+    independent: np.ndarray = np.zeros((0, 2), np.int64)
+    """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
+    difference of their rolling rates, left less right (rad/s), among the internal states."""
+    axes: np.ndarray = np.zeros((0, 3, 3))
+    """(n, 3, 3): principal axes in the body's own as columns; of wheelsets in level axes, see
+    `wrcore.bodies.inertia`. Empty where all bodies' own axes are principal and all wheelsets bodies of revolution."""
+
+
+class Model(NamedTuple):
+    """A compiled scene, for kernels."""
+
+    bodies: Bodies
+    contact: ContactModel
+    elements: Elements
+    joints: Joints
+    track: TrackModel
+    speed: float  # speed of the moving frame, m/s
+    gravity: float  # m/s^2, downwards
+    alpha: float
+    beta: float
+    """Baumgarte's parameters, 1/s."""
+    wheels: int = 0  # address of the kernel that finds the rails' wrenches, see `with_kernels`
+    reactions: int = 0  # address of the kernel that adds the joints' reactions
+    friction: Schedules = pack_schedules([])
+    """Over arc length, for the left and the right rail, where friction is not the same everywhere; else empty."""
+    rail_friction: int = 0  # address of the kernel that looks it up
+    drive: Drive = no_drive()  # motors, brakes and speed controller
+    torques: int = 0  # address of the kernel that adds their torques
+    flexible_track: FlexibleTrack = rigid_track()  # the track under each wheelset, if it is flexible
+    rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
+    controls: Controls = no_controls()  # control laws of the user's own
+    samples: int = 0  # address of the kernel that takes their samples
+    crossing: Crossing = no_crossing()  # rails that change along the track
+    sections: int = 0  # address of the kernel that lays what the wheels see of them
+    strides: int = 0  # address of the kernel that keeps steps short on them
+    check_rails: CheckRails = no_check_rails()
+    guards: int = 0  # address of the kernel that adds their forces
+    slopes: int = 0  # address of the kernel of what patches change, for methods with a Jacobian
+
+
+class Workspace(NamedTuple):
+    """Scratch arrays of one evaluation, and what it leaves for output."""
+
+    rotations: np.ndarray  # (n + 1, 3, 3): of the bodies, and of the moving frame on a curved track
+    arc_lengths: np.ndarray  # (k,): last arc length of each wheelset, m; where the search for the next one starts
+    turns: np.ndarray  # (n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin
+    wrenches: np.ndarray  # (n, 6): force and moment about the centre of mass of each body
+    patches: np.ndarray  # (k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right
+    counts: np.ndarray  # (k, 2) int: patches in contact
+    motions: np.ndarray  # (k, 2, 15): `WheelMotion` of each wheel in its rail's frame
+    rail_wrenches: np.ndarray  # (k, 2, 6): force and moment of the rails on each wheelset
+    rails: np.ndarray  # (k, 2, 3, 3): axes of the rails' frames
+    shifts: np.ndarray  # (k, 2, 2): where rails are off their nominal places, m
+    bounds: np.ndarray  # (k, 2): bound of planar detection's error (detection ``auto`` only), m
+    counters: np.ndarray  # (4,) int, see `wrcore.wheels.hertzian_force`
+    constraints: ConstraintWork
+    frame: np.ndarray  # (3, 3): axes of the track's frame
+    irregularity: np.ndarray
+    strips: StripWork
+    flexible_track: FlexibleTrackWork
+    control: ControlWork
+    principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
+    seen: np.ndarray  # (k, 2, 4): which sections of rails that change the wheels' arrays hold
+    blocks: np.ndarray  # (k, 2) unsigned: which blocks of these, a bit for each
+    section: np.ndarray  # (ROWS + 4, m): scratch of :mod:`wrcore.track.changing_rails`
+
+
+def state_size(model):
+    """Length of the state vector: 13 numbers per body, then all states that belong to no body."""
+    return STATE_SIZE * len(model.bodies.mass) + internal_states(model)
+
+
+def internal_states(model):
+    """Number of states that belong to no body: of force elements and the track, then that of the speed controller, then
+    those of control laws."""
+    return model.elements.states + len(model.drive.control) + len(model.controls.start)
+
+
+def workspace(model):
+    """Allocate the scratch arrays for a model."""
+    n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
+    return Workspace(
+        np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
+        np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
+        np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
+        np.zeros(COUNTERS, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
+        strip_work(model.contact.strips, k, surrogate=model.contact.surrogate), track_work(model.flexible_track, k),
+        control_work(model.controls),
+        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, KNOWN), np.nan),
+        np.zeros((len(model.crossing.tables), 2), np.uint64),
+        np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),
+    )  # fmt: skip
+
+
+@jit(inline="always")
+def independent_at(bodies, j):
+    """Place in the state of half the difference of rolling rates of the j-th wheelset with independent wheels."""
+    return STATE_SIZE * bodies.mass.shape[0] + bodies.independent[j, 1]
+
+
+def frictionless(model):
+    """The model with next to no friction anywhere, in the creep law that costs least."""
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    return model._replace(contact=contact, friction=pack_schedules([]))
