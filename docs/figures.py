@@ -1,4 +1,4 @@
-"""Figures of the theory pages, from plain NumPy equations (`study.cost.plain`): nothing is compiled for them."""
+"""Figures of the theory pages, from plain NumPy equations (`wrcore.reference`): nothing is compiled for them."""
 
 from pathlib import Path
 
@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from study.cost.plain.contact import Pair, cut_strips, patch_of_moments
-from study.cost.plain.forces import damping_factor, linear, shen_hedrick_elkins
 from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, save_figure, styled
 from wrcore.creep.kalker import kalker_data
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import Track
+from wrcore.reference.contact import Pair, cut_strips, patch_of_moments
+from wrcore.reference.forces import damping_factor, linear, shen_hedrick_elkins
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "tests/data/creep/contact_examples.csv"
 SIZE = (5.6, 2.6)

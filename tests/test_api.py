@@ -18,7 +18,8 @@ from tests.conftest import ELLIPTIC, ROOT, SCENES
 
 PUBLIC = sorted(set(wr.__all__) - {"__version__"})
 DOCUMENTED = sorted(
-    {getattr(wr, name).__module__ for name in PUBLIC} | {"wrcore.run.output.channels", "wrcore.run.progress"}
+    {getattr(wr, name).__module__ for name in PUBLIC}
+    | {"wrcore.run.output.channels", "wrcore.run.progress", "wrcore.reference"}
 )
 
 

@@ -1,7 +1,7 @@
 # What things cost: pairs timed in turn, stages of one evaluation, growth, batches, rejected steps.
 
 COST = config["cost"]
-CORE["cost"] = CORE["simulation"] + sources("sweep", "study/cost")
+CORE["cost"] = CORE["simulation"] + sources("sweep", "reference", "study/cost")
 COST_SCENES = {name: (entry["title"], entry["scene"], changes(entry["set"])) for name, entry in COST["scenes"].items()}
 
 

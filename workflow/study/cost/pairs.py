@@ -13,7 +13,6 @@ import time
 import numpy as np
 import pandas as pd
 
-from study.cost.plain.wheelset import plain_wheelset
 from study.cost.recorded import evaluation, record
 from study.cost.search import search_costs
 from study.cost.timing import Bar, Contender, compare, summary, take_turns
@@ -22,6 +21,7 @@ from wrcore.contact.search.detection import PLANAR, SPATIAL
 from wrcore.creep.laws import LAWS
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
+from wrcore.reference.wheelset import plain_wheelset
 from wrcore.run.simulate import output_times
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.cost.plain.contact import Pair, find_patches
-from study.cost.plain.forces import creep_force, damping_factor, hertz
 from wrcore.creep.axes import CreepTableData
 from wrcore.errors import InputError
+from wrcore.reference.contact import Pair, find_patches
+from wrcore.reference.forces import creep_force, damping_factor, hertz
 from wrcore.vehicle.description import GRAVITY
 
 SIDES = (1.0, -1.0)

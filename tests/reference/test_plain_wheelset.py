@@ -3,10 +3,6 @@
 import numpy as np
 import pytest
 
-from study.cost.plain.contact import cut_strips, find_patches
-from study.cost.plain.forces import creep_force as plain_creep_force
-from study.cost.plain.forces import hertz
-from study.cost.plain.wheelset import plain_wheelset
 from tests.conftest import ELLIPTIC
 from wrcore.bodies.body import euler_of, matrix_of
 from wrcore.contact.hertz import contact_modulus, hertz_shape
@@ -19,6 +15,10 @@ from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
+from wrcore.reference.contact import cut_strips, find_patches
+from wrcore.reference.forces import creep_force as plain_creep_force
+from wrcore.reference.forces import hertz
+from wrcore.reference.wheelset import plain_wheelset
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
 
