@@ -72,9 +72,9 @@ def test_a_step_of_a_force_is_the_last_place_to_rest_at(monkeypatch, capsys, fau
         return Equilibrium(state, np.full((1, 2), 5e4), RESIDUALS[begun[-1]], at_a_step=begun[-1] != 7)
 
     monkeypatch.setattr(initial, "solve_equilibrium", solved)
-    assert initial.rest(scene, model).residual == 0.1 and len(begun) == 9
+    assert initial.equilibrium_positions(scene, model).residual == 0.1 and len(begun) == 9
     capsys.readouterr()
     begun.clear()
-    monkeypatch.setattr(initial, "LARGEST_REST_AT_A_STEP", 0.09)
+    monkeypatch.setattr(initial, "LARGEST_RESIDUAL_AT_A_STEP", 0.09)
     with pytest.raises(InputError, match="got accelerations of 0.05 m/s"):
-        initial.rest(scene, model)
+        initial.equilibrium_positions(scene, model)

@@ -8,7 +8,6 @@ from wrcore.kernels.lanes import (
     below,
     count_bits,
     every8,
-    greatest,
     highest_bit,
     lane,
     lanes8,
@@ -16,6 +15,7 @@ from wrcore.kernels.lanes import (
     load8,
     load32,
     lowest_bit,
+    maximum,
     put8,
     put32,
     ramp8,
@@ -41,7 +41,7 @@ def compared(rows, limit):
     one, two = load8(rows, 0, np.uint64(0)), load8(rows, 1, np.uint64(0))
     bits = below(one, lanes8(limit))
     chosen = where_below(one, lanes8(limit), one, two)
-    return bits, count_bits(bits), lowest_bit(bits), highest_bit(bits), greatest(one), total(chosen)
+    return bits, count_bits(bits), lowest_bit(bits), highest_bit(bits), maximum(one), total(chosen)
 
 
 @jit

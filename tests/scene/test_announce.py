@@ -7,7 +7,7 @@ import pytest
 from tests.conftest import ELLIPTIC
 from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
-from wrcore.kernels.told import told_if_long, warn_once
+from wrcore.kernels.told import say_if_long, warn_once
 from wrcore.scene import compile as scene_compile
 from wrcore.scene import creep
 from wrcore.scene.creep import announce, creep_of
@@ -51,7 +51,7 @@ def test_no_line_where_none_is_wanted(monkeypatch, capsys):
     monkeypatch.setenv("WRCORE_PROGRESS", "0")
     monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
     announce("work")
-    with told_if_long("work that takes long"):
+    with say_if_long("work that takes long"):
         time.sleep(0.05)
     assert capsys.readouterr().err == ""
 

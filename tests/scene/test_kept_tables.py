@@ -10,11 +10,11 @@ from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.changing_rails.files import read_slices
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.scene import kept_tables
-from wrcore.scene.kept_tables import OWN, kept_shape, kept_table
+from wrcore.scene.kept_tables import TABLE_FIELDS, kept_shape, kept_table
 
 
 def numbers(table):
-    return [np.asarray(part) for part in (*(getattr(table, name) for name in OWN), *table.geometry)]
+    return [np.asarray(part) for part in (*(getattr(table, name) for name in TABLE_FIELDS), *table.geometry)]
 
 
 def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
@@ -27,7 +27,7 @@ def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
     made = kept_table(pair, rails[0], False)
     (path,) = folder.glob("seen_*.npz")
     whole = path.read_bytes()
-    monkeypatch.setattr(kept_tables, "seen_table", lambda *more: pytest.fail("made anew"))
+    monkeypatch.setattr(kept_tables, "section_table", lambda *more: pytest.fail("made anew"))
     for one, other in zip(numbers(made), numbers(kept_table(pair, rails[0], False)), strict=True):
         np.testing.assert_array_equal(one, other)
     monkeypatch.undo()

@@ -11,7 +11,7 @@ from tests.conftest import ELLIPTIC, ROOT, SCENES
 from tests.track.crossing_rails import write_rail
 from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.bodies.body import STATE_SIZE, VELOCITY
-from wrcore.contact.changing_rails.section_table import ROWS, seen_table
+from wrcore.contact.changing_rails.section_table import ROWS, section_table
 from wrcore.contact.changing_rails.sections import WheelOnSlices
 from wrcore.contact.search.reduction import ANGLE, FX, FY, SEMI_A, SEMI_B, U_WHEEL
 from wrcore.equations.equations_of_motion import Equations
@@ -26,7 +26,7 @@ from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
-from wrcore.track.changing_rails import BEGIN, interpolate, laid_at, with_own_arrays
+from wrcore.track.changing_rails import BEGIN, interpolate, layout_of_rail, with_copied_arrays
 from wrcore.wheels.contact_model import SOLVED
 
 CROSSING = SCENES / "crossing.yaml"
@@ -95,7 +95,7 @@ def pair(request):
 
 @pytest.fixture(scope="module")
 def table(pair):
-    return seen_table(pair, named_profile("60E1", "rail", 0.0))
+    return section_table(pair, named_profile("60E1", "rail", 0.0))
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def table(pair):
 )
 def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
     # along the normal, where the wheel is within 1 mm when it touches; 95 % of places
-    geometry = with_own_arrays(table.geometry)
+    geometry = with_copied_arrays(table.geometry)
     u = geometry.rail_start + geometry.rail_step * np.arange(len(geometry.rail))
     low, high = pair.rail.s[[0, -1]]
     worst = []
@@ -111,7 +111,7 @@ def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
         exact, touch = pair.under("right", s, y, 0.0, yaw)
         place = (s + pair.half_distance * math.sin(yaw) - table.begin) / table.step
         scratch = np.zeros((ROWS + 4, len(u)))
-        laid = np.array(laid_at(table, table.begin, pair.half_distance))
+        laid = np.array(layout_of_rail(table, table.begin, pair.half_distance))
         turn, whole = math.sin(yaw) / table.step, (0, geometry.scan_rail.shape[1])
         interpolate(table.sections, table.strips, laid, place, turn, 1.0, scratch, geometry, False, *whole)
         at = exact.rail_start + exact.rail_step * np.arange(len(exact.rail))

@@ -28,7 +28,7 @@ from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run.simulate import simulate
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
-from wrcore.track.changing_rails import interpolate, laid_under, with_own_arrays
+from wrcore.track.changing_rails import interpolate, layout_of_wheel, with_copied_arrays
 
 MASS, LOAD, RADIUS = 906.5, 54546.0, 0.46  # half a wheelset
 STIFFNESS, DAMPING = 8.1e7, 6e4  # of the track, N/m and N s/m
@@ -254,8 +254,8 @@ def test_what_a_wheel_reaches_is_its_geometry():
 def test_a_yawed_wheel_finds_the_plain_rail_beyond_its_table():
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
     table = shape_table(pair, OutOfRound(RADIUS, (), (Wave(20, 1e-3),)))
-    laid, plain = np.array(laid_under(table, 0.0, 0.0, RADIUS, 0.1)), table.sections[0, 0, HEIGHT]
-    geometry = with_own_arrays(table.geometry)
+    laid, plain = np.array(layout_of_wheel(table, 0.0, 0.0, RADIUS, 0.1)), table.sections[0, 0, HEIGHT]
+    geometry = with_copied_arrays(table.geometry)
     scratch, cells = np.zeros((ROWS + 4, len(plain))), geometry.scan_rail.shape[1]
     for yaw in (0.0, 0.02, -0.04):
         turn = yaw / (table.step * RADIUS)

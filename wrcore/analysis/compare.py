@@ -117,7 +117,7 @@ class Comparison:
             for run, values, look in zip(self.runs, pair, ((COLORS[0], "-"), (COLORS[2], "--")), strict=True):
                 for column in np.reshape(values, (len(run.t), -1)).T:
                     left.plot(run.t, factor * column, color=look[0], linestyle=look[1])
-            apart = _apart(*(values[at] for values, at in zip(pair, places, strict=True)))
+            apart = _channel_difference(*(values[at] for values, at in zip(pair, places, strict=True)))
             right.plot(self.t, factor * apart, color=COLORS[1])
             if (group, name) in stated.index and np.isfinite(error := factor * stated[group, name]):
                 right.axhspan(-error, error, color="0.85", zorder=0)
@@ -208,7 +208,7 @@ def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.flatnonzero(same), near[same]
 
 
-def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _channel_difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Difference of a channel; of patches none where one of the runs has more than the other."""
     width = min(part.shape[1:] for part in (one, other))
     if not width:
@@ -230,7 +230,7 @@ def _scale(of_contact: bool, name: str, *pair: np.ndarray) -> float:
 
 def _row(runs, t, group, name, pair, scale) -> Iterator[dict[str, Any]]:
     """The row of a channel, none where the runs nowhere both have a value."""
-    apart = _apart(*pair).reshape(len(t), -1)
+    apart = _channel_difference(*pair).reshape(len(t), -1)
     known = np.isfinite(apart)
     if not known.any():
         return

@@ -82,7 +82,7 @@ class CurveBalance:
     """(unknowns,): from that balance."""
 
 
-def at_rest(model, state):
+def straight_balance(model, state):
     """Static equilibrium as the balance of straight track."""
     straight, nothing = Curve(0.0, 0.0, 0.0, float(model.speed)), np.zeros(0)
     return CurveBalance(straight, state, 0.0, 0.0, nothing, np.zeros(4), nothing)

@@ -31,13 +31,13 @@ from wrcore.track.track import TrackModel
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
-LARGEST_REST = 1e-6 * GRAVITY
+LARGEST_RESIDUAL = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
 
-LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
+LARGEST_RESIDUAL_ON_STRIPS = 0.02 * GRAVITY
 """The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
 
-LARGEST_REST_AT_A_STEP = 0.1 * GRAVITY
+LARGEST_RESIDUAL_AT_A_STEP = 0.1 * GRAVITY
 """The same where wheels or rails differ, as worn ones do, and a force steps at the only places of rest: with `moment`
 by 10 to 20 % where overlaps merge."""
 
@@ -51,23 +51,23 @@ between worn profiles little tells where."""
 ROUNDING = 1e-9
 """Accelerations of wheelsets below this may be rounding, m/s^2 or rad/s^2."""
 
-REST_SPEED = 20.0
+EQUILIBRIUM_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
 
 
 @np.errstate(all="ignore")  # what overflows is no equilibrium
-def rest(scene, model):
+def equilibrium_positions(scene, model):
     """Where the bodies of a scene's vehicle stand in static equilibrium, moving along together without rotation; speed
     and friction do not matter for it. An InputError if there is none near the nominal position."""
     vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
-        return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
+        return repeated_equilibrium(equilibrium_positions(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
     track = TrackModel(True, model.track.path, model.track.irregularity)
-    level = frictionless(model)._replace(track=track, speed=REST_SPEED)
+    level = frictionless(model)._replace(track=track, speed=EQUILIBRIUM_SPEED)
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
-    limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
+    limit = LARGEST_RESIDUAL_ON_STRIPS if model.contact.strips.strips else LARGEST_RESIDUAL
     unlike, found, faults = model.contact.geometries, [], []
     for offset in (0.0, *(START_OFFSETS if unlike else ())):
         try:
@@ -82,8 +82,8 @@ def rest(scene, model):
             found.append(equilibrium)
     at_a_step = [one for one in found if unlike and one.at_a_step and np.all(one.wheel_loads > 0.0)]
     best = min(at_a_step, key=lambda one: one.residual, default=None)
-    if best is not None and best.residual < LARGEST_REST_AT_A_STEP:
-        left = f"accelerations of up to {LARGEST_REST_AT_A_STEP:.2g} m/s^2 are left"  # one line for all such
+    if best is not None and best.residual < LARGEST_RESIDUAL_AT_A_STEP:
+        left = f"accelerations of up to {LARGEST_RESIDUAL_AT_A_STEP:.2g} m/s^2 are left"  # one line for all such
         warn(f"{scene.source}: the vehicle rests where a contact force steps, and {left}")
         return best
     if not found:
@@ -101,7 +101,7 @@ def _standing(scene, model, offset):
     sides, state = _geometries(model), np.zeros(state_size(model))
     for body, (x, y, z) in enumerate(vehicle.positions):
         at = STATE_SIZE * body
-        state[at : at + 8] = x, y + offset, z, 1.0, 0.0, 0.0, 0.0, REST_SPEED
+        state[at : at + 8] = x, y + offset, z, 1.0, 0.0, 0.0, 0.0, EQUILIBRIUM_SPEED
         if body in wheelsets:
             load = vehicle.nominal_wheel_load(body)
             if load <= 0.0:
@@ -116,12 +116,13 @@ def _standing(scene, model, offset):
 
 def static_equilibrium(scene, model, at_rest=None):
     """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
-    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is its `rest`.
+    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is its
+    `equilibrium_positions`.
 
     Its state is one of the model without its drive (:func:`wrcore.forces.drive.undriven`). An InputError if there is
     none near the nominal position.
     """
-    at_rest = at_rest or rest(scene, model)
+    at_rest = at_rest or equilibrium_positions(scene, model)
     state = _moving(model, at_rest)
     for k, sides in enumerate(_geometries(model)):
         _roll_as_it_stands(scene, model, k, sides, state)
@@ -208,11 +209,11 @@ def initial_state(scene, model, at_rest=None, shared=None):
 
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
     rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
-    ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's `rest`; ``shared``
-    keeps equations of motion for the next scene (`wrcore.equations.many_models.equations_of`).
-    """
+    ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's
+    `equilibrium_positions`; ``shared`` keeps equations of motion for the next scene
+    (`wrcore.equations.many_models.equations_of`)."""
     vehicle, data = scene.vehicle, scene.data
-    at_rest, driven = at_rest or rest(scene, model), model
+    at_rest, driven = at_rest or equilibrium_positions(scene, model), model
     model = undriven(model)
     y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
     state = _moving(model, at_rest)

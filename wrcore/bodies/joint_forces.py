@@ -149,7 +149,7 @@ def _assemble(joints, scratch, p, size):
     order, values, base = joints.order, scratch.joints, joints.order.base[p]
     i, j = joints.bodies[p, 0], joints.bodies[p, 1]
     tile, push = scratch.tiles[base + p], scratch.inverse_mass[i] + scratch.inverse_mass[j]
-    _own_tile(
+    _diagonal_tile(
         values.about[p, 0], scratch.inverse_inertia[i], scratch.mobile[p, 0],
         values.about[p, 1], scratch.inverse_inertia[j], scratch.mobile[p, 1], tile, size,
     )  # fmt: skip
@@ -178,7 +178,7 @@ def _assemble(joints, scratch, p, size):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _own_tile(about, inertia, mobile, other_about, other_inertia, other_mobile, tile, size):
+def _diagonal_tile(about, inertia, mobile, other_about, other_inertia, other_mobile, tile, size):
     """Lower half of R J^-1 R^T, summed over the two bodies of a joint; R J^-1 is kept in ``mobile``."""
     x, y, z = load(inertia[0], 0), load(inertia[1], 0), load(inertia[2], 0)
     u, v, w = load(other_inertia[0], 0), load(other_inertia[1], 0), load(other_inertia[2], 0)

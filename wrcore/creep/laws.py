@@ -22,8 +22,8 @@ from wrcore.kernels.jit import FUSED, jit, rarely_called
 
 LAWS = {"table": 0, "linear": 1, "she": 2, "polach": 3, "fastsim": 4}
 _TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3
-OWN = 5
-"""Number of a law of the user's own, see `own_law`."""
+USER_LAW = 5
+"""Number of a law of the user's own, see `user_law`."""
 
 GROUP = "wrcore.creep_laws"
 """Of entry points, by which installed packages name their laws."""
@@ -64,7 +64,7 @@ def named_law(name, laws):
         raise InputError("", error.field, f"{known}{error.expected}") from None
 
 
-def own_law(name, laws):
+def user_law(name, laws):
     """The same after test calls: ``law(ratio, psi, kalker, xi, eta, phi)`` with kalker = (C11, C22, C23, C33), to (fx,
     fy, mz)."""
     found = named_law(name, laws)
@@ -100,10 +100,10 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 
     data = CreepData(table, fastsim_data, PolachFactors(float(factors[0]), float(factors[1])))
     if law is None:
         return data
-    return with_own_law(data._replace(source=np.array(law.digest, np.int64)))
+    return with_user_law(data._replace(source=np.array(law.digest, np.int64)))
 
 
-def with_own_law(data):
+def with_user_law(data):
     """`CreepData` with the address of the law of the user's own that it names."""
     example = tuple(map(own.Example, (1.0, 0.0, (1.0,) * 4, 0.0, 0.0, 0.0)))
     kernel = own.addressed(_wrapped, tuple(map(int, data.source)), 0, 0, example, FOUR)
@@ -174,7 +174,7 @@ def _other_law(law, data, log_g, g, psi, xi, eta, phi):
         fx, fy, mz = she(kalker, g, xi, eta, phi)
     elif law == _POLACH:
         fx, fy, mz = polach(kalker, data.polach, g, xi, eta, phi)
-    elif law == OWN:
+    elif law == USER_LAW:
         fx, fy, mz, _ = four_at(data.own, g, psi, kalker_coefficients(g, kalker), xi, eta, phi)
     else:
         fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, xi, eta, phi)

@@ -35,7 +35,7 @@ from wrcore.wheels.motion import MOTION
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _turn_wheels_apart(bodies, work, rate):
+def _turn_independent_wheels(bodies, work, rate):
     """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia. The
     wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset."""
     for j in range(bodies.independent.shape[0]):
@@ -128,7 +128,7 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
         wrench[2] = -model.gravity * bodies.mass[b]
     if bodies.wheelsets.shape[0] > 0:
         _add_rail_wrenches(model, state, work, rate, mode)
-        _turn_wheels_apart(bodies, work, rate)
+        _turn_independent_wheels(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     if model.torques != 0:
         call_address(model.torques, model, t, state, work, rate)

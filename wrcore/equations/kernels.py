@@ -7,11 +7,11 @@ from wrcore.forces.control import with_controls
 from wrcore.forces.drive import add_drive
 from wrcore.forces.suspension import with_laws
 from wrcore.kernels.handles import Handles, Kernel, Kind
-from wrcore.track.changing_rails import lay_sections, shorten_step, with_own_arrays
-from wrcore.track.check_rail import press_check_rails, shorten_beside
+from wrcore.track.changing_rails import lay_sections, shorten_step, with_copied_arrays
+from wrcore.track.check_rail import press_check_rails, shorten_near_check_rails
 from wrcore.track.flexible_track import flexible_wrenches
 from wrcore.track.track import fill_rail_friction
-from wrcore.wheels.contact_model import alone, shaped
+from wrcore.wheels.contact_model import shaped, without_wheels
 from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.modes import FRESH
 
@@ -29,14 +29,14 @@ def with_wheels(model):
     """Contact of a model with what each wheel runs on where they differ, and with what its patches need."""
     contact, of_rails = model.contact, looked_up(model)
     if contact.geometries or of_rails[0] != of_rails[1]:
-        wheels, bare = [], alone(contact)
+        wheels, bare = [], without_wheels(contact)
         for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
             strips = contact.strips._replace(looked_up=of_rails[k % 2])
             if strips.looked_up and contact.plain:
                 from wrcore.wheels.table.store import with_pair
 
                 strips = with_pair(bare._replace(geometry=contact.plain[k], strips=strips)).strips
-            geometry = with_own_arrays(geometry) if len(model.crossing.tables) else geometry
+            geometry = with_copied_arrays(geometry) if len(model.crossing.tables) else geometry
             wheels.append(bare._replace(geometry=geometry, strips=strips))
         contact = bare._replace(wheels=np.asarray(Handles(wheels)))
     if contact.strips.strips:
@@ -80,7 +80,7 @@ def with_kernels(model, work):
         kernels["strides"] = Kernel(shorten_step, kind, state, scratch, state, 0)
     if len(model.check_rails.rows):
         kernels["guards"] = Kernel(press_check_rails, kind, state, scratch)
-        kernels["strides"] = Kernel(shorten_beside, kind, state, scratch, state, 0)
+        kernels["strides"] = Kernel(shorten_near_check_rails, kind, state, scratch, state, 0)
     if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
         kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
     if len(model.bodies.wheelsets):

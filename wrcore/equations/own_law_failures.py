@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.creep.laws import with_own_law
+from wrcore.creep.laws import with_user_law
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.forces.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.kernels import own
@@ -27,7 +27,7 @@ def blame(model, t, state, rate, step=0.0):
     def look():
         creep = model.contact.creep
         watched = model._replace(
-            contact=model.contact._replace(creep=with_own_law(creep) if len(creep.source) else creep)
+            contact=model.contact._replace(creep=with_user_law(creep) if len(creep.source) else creep)
         )
         equations = Equations(watched)
         for ahead in (*AHEAD, step):

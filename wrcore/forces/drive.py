@@ -122,7 +122,7 @@ def _controlled(model):
 
 
 @jit(allocates=False)
-def wheels_apart_at(bodies, k):
+def independent_wheels_at(bodies, k):
     """Place in the state of half the difference of rolling rates of the k-th wheelset; that of the last independent one
     if it has none."""
     place = -1
@@ -164,7 +164,7 @@ def actuator(model, i, force, t, state, work):
             turn -= state[STATE_SIZE * row[REACTION] + OMEGA + k]
         rate += axes[k, 1] * turn
     if row[WHEEL] != 0:
-        rate += row[WHEEL] * state[wheels_apart_at(model.bodies, row[NUMBER])]
+        rate += row[WHEEL] * state[independent_wheels_at(model.bodies, row[NUMBER])]
     value = force
     if kind == COMMANDED:
         value = work.control.outputs[row[TABLE]]
@@ -190,5 +190,5 @@ def add_drive(model, t, state, work, rate):
             if body != FRAME:
                 work.wrenches[body, 3 + k] -= moment
         if model.drive.rows[i, WHEEL] != 0:
-            at = wheels_apart_at(model.bodies, model.drive.rows[i, NUMBER])
+            at = independent_wheels_at(model.bodies, model.drive.rows[i, NUMBER])
             rate[at] += model.drive.rows[i, WHEEL] * torque / model.bodies.inertia[wheelset, 1]

@@ -33,7 +33,7 @@ from wrcore.bodies.vector import cross, dot, load, minus
 from wrcore.forces import law
 from wrcore.kernels.handles import FOUR, Kernel, Kind, four_at
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.kernels.named_laws import Own, text_digest
+from wrcore.kernels.named_laws import UserFunction, text_digest
 from wrcore.track.track import moving_frame, turned_back, turned_into
 
 STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
@@ -96,7 +96,7 @@ def pack_elements(springs=(), directed=(), turning=()):
             pressing[presses[0]] = orders[presses[0]].index(presses[1])
         end = length + len(tables[-1])
         on_line, first, last = not np.any(row[law.AXIS :]), length, end
-        if isinstance(kernel, Own):
+        if isinstance(kernel, UserFunction):
             number, first, last = -1 - own.setdefault(kernel.digest, len(own)), len(parameters), -1
             parameters += numbers
             last, numbers = len(parameters), (inner,)

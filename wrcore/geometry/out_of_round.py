@@ -11,7 +11,7 @@ import numpy as np
 
 from wrcore.geometry.changing_rails.slices import TURN
 
-BESIDE = 0.01
+FLAT_MARGIN = 0.01
 """Length beside a flat over which a wheel sees it yet, m: more than half a window of
 `wrcore.contact.changing_rails.sections`."""
 
@@ -106,7 +106,7 @@ class OutOfRound:
         """First angle (rad), step and number of nodes, a ``step`` (m) apart at most, half of it where only flats are
         not round: all of it, and ``pad`` more at either end."""
         step *= (1.0 if self.waves else 0.5) / self.radius
-        reaches = [flat.half_angle(self.radius) + BESIDE / self.radius for flat in self.flats]
+        reaches = [flat.half_angle(self.radius) + FLAT_MARGIN / self.radius for flat in self.flats]
         low = min((flat.at - reach for flat, reach in zip(self.flats, reaches, strict=True)), default=0.0)
         high = max((flat.at + reach for flat, reach in zip(self.flats, reaches, strict=True)), default=0.0)
         count = math.ceil((high - low) / step)

@@ -42,7 +42,7 @@ MOST_SAMPLES = 2_000_000
 """More samples of a generated irregularity take too much memory."""
 
 _KINDS = ("tangent", "transition", "curve")
-_OWN_KEYS = {
+_SEGMENT_KEYS = {
     "tangent": set(),
     "transition": {"shape", "radius", "cant", "widening"},
     "curve": {"radius", "cant", "widening"},
@@ -147,7 +147,7 @@ def _kind(i, segment, source):
     kinds = [kind for kind in _KINDS if kind in segment]
     if len(kinds) != 1:
         raise InputError(source, f"track.path.{i}", f"expected one of {', '.join(_KINDS)}, got {sorted(segment)}")
-    extra = sorted(set(segment) - {kinds[0]} - _OWN_KEYS[kinds[0]])
+    extra = sorted(set(segment) - {kinds[0]} - _SEGMENT_KEYS[kinds[0]])
     if extra:
         ramp = ": a cant ramp on straight track is {transition: LENGTH, cant: CANT} before the transition of the curve"
         expected = f"expected no such key in a {kinds[0]}{ramp * (extra[0] == 'cant')}"

@@ -22,7 +22,7 @@ import math
 from wrcore.contact.search.moved import ACROSS, MOVES
 from wrcore.jacobian.hertzian_wheel import SLOPES
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.track.flexible_track import RAILS, first_place
+from wrcore.track.flexible_track import RAILS, first_state_index
 from wrcore.wheels.motion import MOTION
 
 PLACES, SPEEDS = SLOPES, SLOPES + 2
@@ -44,7 +44,7 @@ def over_rails(model, state, rate, motions):
     """Turn motions over rails at rest into those over the rails, displaced as in a ``state`` of that ``rate``."""
     for k in range(motions.shape[0]):
         for i in range(RAILS):
-            at, motion = first_place(model, k) + i, motions[k, i // 2]
+            at, motion = first_state_index(model, k) + i, motions[k, i // 2]
             motion[MOTION.y + i % 2] -= state[at]
             motion[MOTION.vy + i % 2] -= rate[at]
 
@@ -95,7 +95,7 @@ def in_balance(rate, model, work):
     """Whether the rails' speeds in the work are those in a ``rate``, or nearly so."""
     for k in range(work.flexible_track.speeds.shape[0]):
         for i in range(RAILS):
-            if not abs(work.flexible_track.speeds[k, i] - rate[first_place(model, k) + i]) < BALANCED:
+            if not abs(work.flexible_track.speeds[k, i] - rate[first_state_index(model, k) + i]) < BALANCED:
                 return False
     return True
 
@@ -107,7 +107,7 @@ def hold_speeds(slopes, rate, model, work):
     scratch = work.flexible_track
     for k in range(slopes.shape[0]):
         for i in range(RAILS):
-            scratch.speeds[k, i] = rate[first_place(model, k) + i]
+            scratch.speeds[k, i] = rate[first_state_index(model, k) + i]
         for wheel in range(2):
             inverse = _inverse(model.flexible_track, wheel, slopes[k, wheel])
             for i in range(2):
@@ -132,7 +132,7 @@ def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
     """Write the rails' speeds in a stage into the work; arguments as for `_implied`."""
     for k in range(work.flexible_track.speeds.shape[0]):
         for i in range(RAILS):
-            at = first_place(model, k) + i
+            at = first_state_index(model, k) + i
             speed = rate[at] + _implied(at, begun, weights, step, rate, drift, stages)
             work.flexible_track.speeds[k, i] = speed
 
@@ -141,9 +141,9 @@ def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
 def speeds_error(begun, weights, step, rate, drift, stages, tolerances, pace, model):
     """Error of the rails' speeds in a step, root mean square over what a velocity is allowed; in short steps over more,
     `SHORT`."""
-    total, wheelsets, allowed = 0.0, model.bodies.wheelsets.shape[0], pace * tolerances[0, first_place(model, 0)]
+    total, wheelsets, allowed = 0.0, model.bodies.wheelsets.shape[0], pace * tolerances[0, first_state_index(model, 0)]
     for k in range(wheelsets):
         for i in range(RAILS):
-            at = first_place(model, k) + i
+            at = first_state_index(model, k) + i
             total += (_implied(at, begun, weights, step, rate, drift, stages) / allowed) ** 2
     return min(1.0, SHORT * pace * step) * math.sqrt(total / (RAILS * wheelsets))

@@ -55,7 +55,7 @@ def internal_state_bodies(model):
             bodies[state] = joined[model.bodies.wheelsets[wheelset]]
     bodies += [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
     bodies += [set() for _ in model.controls.start]
-    for ends, states in [*control_links(model), *_wheels_driven_apart(model)]:
+    for ends, states in [*control_links(model), *_independently_driven_wheels(model)]:
         for state in states:
             bodies[state] = bodies[state].union(*(joined[b] for b in ends))
     for states in internal_state_groups(model):
@@ -71,7 +71,7 @@ def _states_of(elements, k):
     return range(first, first + (int(elements.directed[k, NUMBERS]) if own else 1)) if first >= 0 else ()
 
 
-def _wheels_driven_apart(model):
+def _independently_driven_wheels(model):
     """For each motor or brake of a single wheel whose torque depends on the motion: bodies whose motion it is, and the
     internal state of the wheels, with the speed controller's if that is what drives."""
     independent = {int(wheelset): int(state) for wheelset, state in model.bodies.independent}
@@ -119,7 +119,7 @@ def internal_state_groups(model):
     for wheelset, state in model.bodies.independent if groups else ():
         groups[wheelset].append(int(state))
     elements = [list(_states_of(model.elements, k)) for k in range(len(model.elements.law))]
-    more = [*elements, *(sorted(states) for _, states in [*control_links(model), *_wheels_driven_apart(model)])]
+    more = [*elements, *(sorted(states) for _, states in [*control_links(model), *_independently_driven_wheels(model)])]
     for states in more:
         if len(states) > 1:
             shared = [group for group in groups if set(group) & set(states)]

@@ -145,7 +145,7 @@ def _add_column(rail, wheel, direction, slope, scale, columns):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _turn_apart(m, half, inertia, slopes):
+def _add_rate_difference(m, half, inertia, slopes):
     """Add the row by half the difference of the rolling rates (rad/s) to a wheel's ``slopes``, and the column of its
     rate. The wheel turns by it about an axle that moves."""
     row, column, apart = slopes.shape[0] - 1, slopes.shape[1] - 1, m.side * half
@@ -169,7 +169,7 @@ def add_slopes(jacobian, state, model, columns):
             number = jacobian.column_numbers[k, columns.shape[1] - 1]
             if model.bodies.independent.shape[0] > 0 and number >= 0:
                 half, body = state[number + model.bodies.mass.shape[0]], model.bodies.wheelsets[k]
-                _turn_apart(m, half, model.bodies.inertia[body, 1], slopes)
+                _add_rate_difference(m, half, model.bodies.inertia[body, 1], slopes)
                 _add_share(rail, wheel, slopes[slopes.shape[0] - 1], 1.0, columns[k, columns.shape[1] - 1])
             for j in range(SLOPES):
                 direction = direction_of(j)

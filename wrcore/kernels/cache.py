@@ -88,7 +88,7 @@ def _prepared(wanted):
         where = error.filename or wanted
         warn(f"cache {where + ': ' if where else ''}{error.strerror}; a temporary one is used: kernels compile anew")
     root = Path(tempfile.mkdtemp(prefix="wrcore-"))
-    atexit.register(_remove_own, root, os.getpid())
+    atexit.register(_remove_temporary, root, os.getpid())
     return _with_parts(root)
 
 
@@ -144,7 +144,7 @@ def drop_unused(folder, pattern):
                 old.unlink()
 
 
-def _remove_own(root, process):
+def _remove_temporary(root, process):
     if os.getpid() == process:  # not in a fork
         shutil.rmtree(root, ignore_errors=True)
 

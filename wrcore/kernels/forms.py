@@ -25,7 +25,7 @@ from numba.core.typed_passes import NativeLowering
 
 from wrcore.kernels import aside
 from wrcore.kernels.cache import kernel_folder, sources_changed, warn
-from wrcore.kernels.told import told_if_long
+from wrcore.kernels.told import say_if_long
 
 _FOLDER = str(kernel_folder())
 
@@ -198,7 +198,7 @@ def _rarely_collected():
         _compiling += 1
         gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
         try:
-            with nullcontext() if within else told_if_long(_COMPILING):
+            with nullcontext() if within else say_if_long(_COMPILING):
                 yield
         finally:
             gc.set_threshold(*before)

@@ -233,7 +233,7 @@ def root(_, lanes):
 
 
 @intrinsic
-def greatest(_, lanes):
+def maximum(_, lanes):
     """The greatest lane."""
 
     def generate(__, builder, call, arguments):

@@ -39,7 +39,7 @@ class LawFile(NamedTuple):
     name: str
 
 
-class Own(NamedTuple):
+class UserFunction(NamedTuple):
     """A function of the user."""
 
     name: str
@@ -87,12 +87,12 @@ class Laws:
         self.known: dict[str, Any] = {}
         self._before = dict(before or {})
 
-    def find(self, law: str, group: str = GROUP) -> Own:
+    def find(self, law: str, group: str = GROUP) -> UserFunction:
         """The law that a text names; an InputError without a source says what was expected."""
         key = law if ":" in law else f"{law} of {group}"
         if key not in self.known:
             self.known[key] = self._before.get(key) or self._source_of(law, group)
-        return _own(self.known[key])
+        return _user_function(self.known[key])
 
     def beside(self, law: str, folder: Path) -> str:
         """The text that names a law of a file in ``folder`` (a vehicle file say) with the absolute path of the law's
@@ -117,7 +117,7 @@ class Laws:
         """SHA-256 of each law, by the text that names it, without the folder of its file."""
         found: dict[str, set[str]] = {}
         for text, source in self.known.items():
-            found.setdefault(text.replace("\\", "/").rpartition("/")[2], set()).add(_own(source).sha256)
+            found.setdefault(text.replace("\\", "/").rpartition("/")[2], set()).add(_user_function(source).sha256)
         return {name: "+".join(sorted(each)) for name, each in found.items()}
 
     def allow(self) -> None:
@@ -188,8 +188,8 @@ def loaded(entry: Any, group: str) -> Any:
     return guarded(f"the entry point {entry.name} of {group}", entry.load)
 
 
-def _own(source):
-    """`Own` of a source."""
+def _user_function(source):
+    """`UserFunction` of a source."""
     if isinstance(source, LawFile):
         name, content = source.name, source.content
     else:
@@ -200,7 +200,7 @@ def _own(source):
     digest = tuple(int(part) for part in np.frombuffer(sha, np.int64))
     if not (isinstance(source, LawFile) and digest in _KNOWN):  # a function may hold objects that only look alike
         _KNOWN[digest] = source
-    return Own(name, digest)
+    return UserFunction(name, digest)
 
 
 def _file_below(place, folder):
@@ -272,12 +272,12 @@ def said(error: BaseException) -> str:
 
 def text_digest(function: Any) -> tuple[int, ...]:
     """Four numbers for a kernel of an installed package and the text of its module."""
-    return _own(getattr(sys.modules[function.__module__], function.__name__)).digest
+    return _user_function(getattr(sys.modules[function.__module__], function.__name__)).digest
 
 
 def function_of(digest: Iterable[int]) -> Callable:
     """The function with a digest."""
-    return Own("", tuple(map(int, digest))).function
+    return UserFunction("", tuple(map(int, digest))).function
 
 
 def name_of(digest: Iterable[int]) -> str:

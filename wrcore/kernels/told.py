@@ -76,7 +76,7 @@ def tell(text):
 
 
 @contextmanager
-def told_if_long(text, spent=0.0):
+def say_if_long(text, spent=0.0):
     """Say a line once what is done takes long, with the time ``spent`` before (s); none with ``WRCORE_PROGRESS=0``."""
     if _silent():
         yield

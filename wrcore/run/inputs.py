@@ -37,7 +37,7 @@ class Input:
         return float(self.places[0]) / self.factor if np.all(self.places == self.places[0]) else float("nan")
 
 
-def with_own_arrays(model: Model) -> Model:
+def with_copied_arrays(model: Model) -> Model:
     """A model that shares no array of inputs with its scene's vehicle."""
     return model._replace(elements=model.elements._replace(directed=model.elements.directed.copy()))
 

@@ -29,7 +29,7 @@ from wrcore.run.asked import condition_of, on_grid, told_by, value_of
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.checks.reach import check_reach
 from wrcore.run.checks.validity import LOOK_UP_ERRORS
-from wrcore.run.inputs import Input, inputs_of, with_own_arrays
+from wrcore.run.inputs import Input, inputs_of, with_copied_arrays
 from wrcore.run.output.run import Run
 from wrcore.run.simulate import LARGEST_RUN, STARTS, bytes_per_time, opened
 from wrcore.run.simulation import DERAILED_Y, Simulation
@@ -106,7 +106,7 @@ class Session:
 
     def __init__(self, simulation: Simulation, begin: float, record: bool = True) -> None:
         self.scene, self._simulation, self._recorded = simulation.scene, simulation, record
-        model = simulation.model = with_own_arrays(simulation.model)
+        model = simulation.model = with_copied_arrays(simulation.model)
         settings = self.scene.data["integration"]
         step, longest = settings["step"], settings["longest_step"]
         start, method, looks = beginning(model, simulation.start, settings["method"], step)

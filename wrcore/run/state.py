@@ -43,7 +43,7 @@ def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -
     InputError for a state of another vehicle, or an array of bodies that are elsewhere.
     """
     if not isinstance(state, State):
-        _check_place(model, vehicle, state, source)
+        _check_position(model, vehicle, state, source)
         return model
     names = vehicle.name, *vehicle.body_names
     if state.vehicle and state.vehicle != names:
@@ -58,7 +58,7 @@ def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -
     return model._replace(elements=elements, joints=joints._replace(markers=markers))
 
 
-def _check_place(model, vehicle, state, source):
+def _check_position(model, vehicle, state, source):
     """Refuse an array whose bodies are not beside the frame, to which elements hold them, at its beginning."""
     if np.shape(state) != (state_size(model),) or np.asarray(state).dtype.kind not in "fiu":
         return  # no state at all: the integrator says so

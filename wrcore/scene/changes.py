@@ -21,7 +21,7 @@ def changes_of(overrides, changes):
         flat = list(_flat(changes))
     except RecursionError:
         raise InputError("changes", "", "expected mappings that do not contain themselves") from None
-    check_apart({key for key, _ in flat}, "changes")  # of equal ones the last one counts
+    check_disjoint({key for key, _ in flat}, "changes")  # of equal ones the last one counts
     return [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in flat]
 
 
@@ -29,7 +29,7 @@ PLACES = ({"x": "0", "y": "1", "z": "2"}, {"roll": "0", "pitch": "1", "yaw": "2"
 """What a change of a vehicle may call the numbers of a key that holds three."""
 
 
-def check_apart(keys: Iterable[str], source, above=""):
+def check_disjoint(keys: Iterable[str], source, above=""):
     """Raise an InputError where one of several keys holds another one, or is it by another name: which of them counts
     would depend on their order. ``above`` is the field that holds the keys."""
     for (path, key), (inner, other) in pairwise(sorted((_places_of(key), key) for key in keys)):
@@ -106,7 +106,7 @@ def set_at(data, key, value, source):
     """Set the value at a path of keys, or take the key out for None; a number means one of a list."""
     *path, last = key.split(".")
     for part in path:
-        data = data[_place(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
+        data = data[_list_index(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
         if not isinstance(data, dict | list):
             raise InputError(source, key, f"expected a key below a mapping, but {part!r} holds a value")
     if value is None and isinstance(data, dict):
@@ -114,10 +114,10 @@ def set_at(data, key, value, source):
             raise InputError(source, key, "expected a key that the scene has, to take it out")
         del data[last]
         return
-    data[_place(data, last, key, source) if isinstance(data, list) else last] = value
+    data[_list_index(data, last, key, source) if isinstance(data, list) else last] = value
 
 
-def _place(items, part, key, source):
+def _list_index(items, part, key, source):
     """The place in a list that a part of a key path says."""
     if not part.isdecimal() or int(part) >= len(items):
         raise InputError(source, key, f"expected the number of one of {len(items)} in the list, from 0, got {part!r}")

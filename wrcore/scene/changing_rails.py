@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from wrcore.contact.changing_rails.section_table import BLEND, SeenTable
+from wrcore.contact.changing_rails.section_table import BLEND, SectionTable
 from wrcore.contact.changing_rails.sections import REACH
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
@@ -25,7 +25,7 @@ from wrcore.kernels.cache import warn
 from wrcore.kernels.told import warn_once
 from wrcore.scene.kept_tables import kept_shape, kept_table
 from wrcore.scene.pairs import find_file
-from wrcore.track.changing_rails import crossing_of, laid_along, laid_at, laid_under
+from wrcore.track.changing_rails import crossing_of, layout_of_corrugation, layout_of_rail, layout_of_wheel
 
 JOINED = 1e-4
 """How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
@@ -44,7 +44,7 @@ BENEATH, BELOW, CROWN = 0.08, -0.03, 3e-3
 
 
 @dataclass(frozen=True, eq=False)
-class LaidCrossing:
+class PlacedCrossing:
     """A stretch of track where rails change."""
 
     rails: tuple
@@ -64,7 +64,7 @@ class LaidCrossing:
 
 
 def read_crossings(data, vehicle, pairs, folder, source):
-    """`LaidCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
+    """`PlacedCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
     the schema; ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail
     they join."""
     specs, laid, known = data["track"].get("crossing", []), [], {}
@@ -73,7 +73,7 @@ def read_crossings(data, vehicle, pairs, folder, source):
         what = json.dumps([spec["slices"], spec["rail"]], sort_keys=True)
         if what not in known:
             known[what] = _rails(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
-        crossing = known[what] and LaidCrossing(known[what], float(spec["at"]), spec["reversed"])
+        crossing = known[what] and PlacedCrossing(known[what], float(spec["at"]), spec["reversed"])
         if crossing is not None:
             _check_begin(crossing, vehicle, source, f"{field}.at")
             laid.append((crossing, field))
@@ -87,7 +87,7 @@ def read_crossings(data, vehicle, pairs, folder, source):
 
 
 def _rails(spec, depth, pairs, folder, source, field):
-    """Rails of a `LaidCrossing`, None where they are plain."""
+    """Rails of a `PlacedCrossing`, None where they are plain."""
     slices = _slices(spec["slices"], folder, source, f"{field}.slices")
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     rails = [
@@ -205,12 +205,12 @@ def read_corrugation(data, crossings, shapes, source):
     return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
 
 
-def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
+def sections_under_wheels(crossings, shapes, corrugation, pairs, starts):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
     and the `wrcore.track.changing_rails.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc
     lengths (k,) at which wheelsets begin, m."""
     known: dict[tuple, int] = {}
-    tables: list[SeenTable] = []
+    tables: list[SectionTable] = []
     geometries, of_wheels = [], []
 
     def number(pair, what, make, backwards=False):
@@ -232,14 +232,16 @@ def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
             for crossing in laid:
                 slices, back = crossing.rails[k % 2], crossing.backwards
                 table = number(pair, slices, partial(kept_table, pair, slices, back, lateral), back)
-                passed.append((table, laid_at(tables[table], tables[table].begin + crossing.at, pair.half_distance)))
+                passed.append(
+                    (table, layout_of_rail(tables[table], tables[table].begin + crossing.at, pair.half_distance))
+                )
         elif shape is not None:
             table = number(pair, shape, partial(kept_shape, pair, shape))
             radius = 0.5 * (pairs[k - k % 2].rolling_radius + pairs[k + 1 - k % 2].rolling_radius)
-            passed.append((table, laid_under(tables[table], starts[k // 2], angle, radius, shape.shortest)))
+            passed.append((table, layout_of_wheel(tables[table], starts[k // 2], angle, radius, shape.shortest)))
         elif wave is not None:
             table = number(pair, wave, partial(kept_shape, pair, wave))
-            passed.append((table, laid_along(tables[table], wave, pair.half_distance)))
+            passed.append((table, layout_of_corrugation(tables[table], wave, pair.half_distance)))
         geometries.append(_on_plain_rail(pair, [tables[table] for table, _ in passed]))
         of_wheels.append(passed)
     return tuple(geometries), crossing_of(tables, of_wheels)

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from wrcore.balance.initial import initial_state, rest
+from wrcore.balance.initial import equilibrium_positions, initial_state
 from wrcore.contact.hertz import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.search.detection import DETECTIONS
 from wrcore.contact.search.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
-from wrcore.creep.laws import LAWS, OWN
+from wrcore.creep.laws import LAWS, USER_LAW
 from wrcore.equations.model import Model
 from wrcore.errors import InputError
 from wrcore.kernels.told import tell
-from wrcore.scene.changing_rails import seen_by_wheels, warn_of_rigid_rails
+from wrcore.scene.changing_rails import sections_under_wheels, warn_of_rigid_rails
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.creep import creep_of
@@ -80,7 +80,7 @@ def compile_scene(
     pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
     if any(changing):
         starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
-        geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(*changing, pairs, starts))
+        geometries, crossing = _kept(shared, "crossing", parts, lambda: sections_under_wheels(*changing, pairs, starts))
         geometry, plain = geometries[0], tuple(pair.geometry for pair in pairs)  # of the type of all
         if "support" not in data["track"]:
             warn_of_rigid_rails(scene.source)
@@ -90,7 +90,7 @@ def compile_scene(
     model = Model(
         vehicle.bodies,
         ContactModel(
-            geometry, hertz_table(), LAWS.get(contact["creep"]["model"], OWN),
+            geometry, hertz_table(), LAWS.get(contact["creep"]["model"], USER_LAW),
             _kept(shared, "creep", (*contact["creep"].values(), *material.values()),
                   lambda: creep_of(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
@@ -117,7 +117,7 @@ def compile_scene(
         *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
     with meanwhile(model):
-        at_rest = _kept(shared, "rest", decisive, lambda: rest(scene, model))
+        at_rest = _kept(shared, "equilibrium_positions", decisive, lambda: equilibrium_positions(scene, model))
         return model, initial_state(scene, model, at_rest, shared)
 
 

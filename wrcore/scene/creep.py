@@ -4,7 +4,7 @@ import os
 from typing import Any
 
 from wrcore.contact.search.reduction import REDUCTIONS
-from wrcore.creep.laws import LAWS, creep_data, named_law, own_law
+from wrcore.creep.laws import LAWS, creep_data, named_law, user_law
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.errors import InputError
 from wrcore.kernels.cache import say
@@ -65,6 +65,6 @@ def creep_of(scene: Any, progress: Any) -> Any:
 def _creep_law(scene):
     """The creep law of the user that a scene names."""
     try:
-        return own_law(scene.data["contact"]["creep"]["model"], scene.laws)
+        return user_law(scene.data["contact"]["creep"]["model"], scene.laws)
     except InputError as error:
         raise InputError(scene.source, "contact.creep.model", error.expected) from None

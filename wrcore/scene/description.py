@@ -28,7 +28,7 @@ from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.named_laws import Laws
 from wrcore.scene.changes import changes_of, of_a_change, set_at
 from wrcore.scene.changing_rails import (
-    LaidCrossing,
+    PlacedCrossing,
     read_corrugation,
     read_crossings,
 )
@@ -89,7 +89,7 @@ class Scene:
     rail: ProfileCurve
     track: Track
     pairs: tuple[WheelOnRail, ...] = ()
-    crossings: tuple[LaidCrossing, ...] = ()
+    crossings: tuple[PlacedCrossing, ...] = ()
     out_of_round: tuple[tuple[OutOfRound | None, float], ...] = ()
     corrugation: Corrugation | None = None
     files: dict[str, str] = field(default_factory=dict)

@@ -10,12 +10,12 @@ from contextlib import suppress
 import numpy as np
 
 from wrcore.contact.changing_rails.out_of_round import SlicedWheel
-from wrcore.contact.changing_rails.section_table import SeenTable, seen_table, shape_table
+from wrcore.contact.changing_rails.section_table import SectionTable, section_table, shape_table
 from wrcore.contact.changing_rails.sections import WheelOnSlices
 from wrcore.contact.search.geometry import ContactGeometry
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, table_folder
-from wrcore.kernels.told import told_if_long
+from wrcore.kernels.told import say_if_long
 
 FORM = 1
 """Number of the form of these tables. Count it up with every change to the numbers in a table: those in caches are then
@@ -24,15 +24,15 @@ left alone, and made anew. A test compares a table with one that is known."""
 SEAL = 32
 """Bytes of the digest behind a file's content."""
 
-OWN = "begin", "step", "sections", "strips", "bounds"
+TABLE_FIELDS = "begin", "step", "sections", "strips", "bounds"
 
 
 def kept_table(pair, slices, backwards, lateral=None):
-    """`seen_table` of slices in place of a pair's rail, from the cache where it was made before."""
+    """`section_table` of slices in place of a pair's rail, from the cache where it was made before."""
     wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
     lateral = lateral or slices.lateral
     digest = _digest(pair, slices.sheets, slices.s, backwards, *lateral)
-    return _kept(digest, lambda: seen_table(wheel, pair.rail, backwards, lateral))
+    return _kept(digest, lambda: section_table(wheel, pair.rail, backwards, lateral))
 
 
 def kept_shape(pair, shape):
@@ -48,9 +48,9 @@ def _kept(digest, make):
     path = table_folder() / f"seen_{digest}.npz"
     table = _read(path)
     if table is None:
-        with told_if_long("what wheels see of slices is worked out, once"):
+        with say_if_long("what wheels see of slices is worked out, once"):
             table = make()
-        parts = {name: getattr(table, name) for name in OWN} | table.geometry._asdict()
+        parts = {name: getattr(table, name) for name in TABLE_FIELDS} | table.geometry._asdict()
         del parts["over"]
         with suppress(OSError), appearing(path) as file:
             content = io.BytesIO()
@@ -61,7 +61,7 @@ def _kept(digest, make):
 
 
 def _read(path):
-    """The `SeenTable` of a file; None where there is none, or its bytes are not those that were written."""
+    """The `SectionTable` of a file; None where there is none, or its bytes are not those that were written."""
     with suppress(OSError):
         content = path.read_bytes()
         arrays, seal = content[:-SEAL], content[-SEAL:]
@@ -79,11 +79,11 @@ def _seal(content):
 
 
 def _table_of(found):
-    """The `SeenTable` of a file's arrays."""
+    """The `SectionTable` of a file's arrays."""
     parts = {name: found[name] for name in found.files}
     parts = {name: part if part.ndim else part.item() for name, part in parts.items()}
-    own = {name: parts.pop(name) for name in OWN}
-    return SeenTable(**own, geometry=ContactGeometry(**parts))
+    own = {name: parts.pop(name) for name in TABLE_FIELDS}
+    return SectionTable(**own, geometry=ContactGeometry(**parts))
 
 
 def _digest(pair, sheets_of_it, places, *numbers):

@@ -22,7 +22,7 @@ from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checks.reach import check_reach
-from wrcore.scene.changes import check_apart
+from wrcore.scene.changes import check_disjoint
 from wrcore.scene.description import Scene, changed_by_caller, changed_by_file
 from wrcore.scene.pairs import find_file
 from wrcore.scene.stored import StoredScene
@@ -117,7 +117,7 @@ def load_sweep(
     read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
     if isinstance(source, Mapping) and isinstance(source["scene"], StoredScene):
         read_from = StoredScene(read_from)
-    check_apart(data["keys"], name, "keys")
+    check_disjoint(data["keys"], name, "keys")
     keys = data["keys"]
     scene = changed_by_caller(changed_by_file(read_from, data["set"], folder, undecided=keys), overrides, keys)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}

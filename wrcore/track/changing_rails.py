@@ -51,9 +51,9 @@ BEGIN, STEP, LAST, PERIOD, LEAD, LEAN, START, END, FADE, STRIDE = range(10)
 after which they come again (in steps; 0: never), how far ahead a yaw moves what the wheel sees (m/rad), whether
 patches lean with the rail (1) or it is level (0), arc lengths between which sections that come again are there, length
 over which these come and go (m), and longest step on all (m)."""
-LAID = 10
+N_LAYOUT = 10
 
-BESIDE = 2
+NEIGHBOUR_CELLS = 2
 """Cells on either side of those that are laid whose nodes are."""
 
 BOUNDS = 2 * PARTS
@@ -70,7 +70,7 @@ class Crossing(NamedTuple):
     is none."""
 
     sections: np.ndarray
-    """(tables, n, 2, ROWS, m): see `wrcore.contact.changing_rails.section_table.SeenTable`."""
+    """(tables, n, 2, ROWS, m): see `wrcore.contact.changing_rails.section_table.SectionTable`."""
     strips: np.ndarray
     """(tables, 2, m): of the strips over it, see `SeenTable`."""
     bounds: np.ndarray  # (tables, 1 + stretches, rows, blocks)
@@ -83,7 +83,7 @@ class Crossing(NamedTuple):
 def no_crossing():
     """A `Crossing` where no rail changes."""
     sizes = (0, 0, 2, ROWS, 0), (0, 2, 0), (0, 0, 0, 0)
-    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2, 1), np.int64), np.zeros((0, 2, 1, LAID)))
+    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2, 1), np.int64), np.zeros((0, 2, 1, N_LAYOUT)))
 
 
 def crossing_of(tables, of_wheels):
@@ -91,19 +91,19 @@ def crossing_of(tables, of_wheels):
     number and how it is laid (LAID,)."""
     parts = (_stacked([getattr(one, name) for one in tables]) for name in ("sections", "strips", "bounds"))
     shape = len(of_wheels), max(map(len, of_wheels))
-    numbers, laid = np.full(shape, -1), np.zeros((*shape, LAID))
+    numbers, laid = np.full(shape, -1), np.zeros((*shape, N_LAYOUT))
     for wheel, passed in enumerate(of_wheels):
         for i, (table, row) in enumerate(passed):
             numbers[wheel, i], laid[wheel, i] = table, row
-    return Crossing(*parts, numbers.reshape(-1, 2, shape[1]), laid.reshape(-1, 2, shape[1], LAID))
+    return Crossing(*parts, numbers.reshape(-1, 2, shape[1]), laid.reshape(-1, 2, shape[1], N_LAYOUT))
 
 
-def laid_at(table, begin, lead):
+def layout_of_rail(table, begin, lead):
     """How the `SeenTable` of a rail is laid under a wheel whose tape circle is ``lead`` (m) from the middle."""
     return [begin, table.step, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, math.inf, 1.0, TRAVEL]
 
 
-def laid_under(table, start, angle, radius, shortest):
+def layout_of_wheel(table, start, angle, radius, shortest):
     """How the `SeenTable` of a wheel out of round is laid: at the arc length ``start`` (m) the ``angle`` (rad) of a
     wheelset with a mean ``radius`` (m) touches; what is not round is no shorter than ``shortest`` (m)."""
     begin, step = start + (table.begin - angle) * radius, table.step * radius
@@ -112,8 +112,8 @@ def laid_under(table, start, angle, radius, shortest):
     return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]  # without end, either way
 
 
-def laid_along(table, corrugation, lead):
-    """As `laid_at`, of a `Corrugation`."""
+def layout_of_corrugation(table, corrugation, lead):
+    """As `layout_of_rail`, of a `Corrugation`."""
     begin, last, wave = corrugation.begin, len(table.sections) - 1, corrugation.wavelength
     stride, end = min(TRAVEL, 0.25 * wave), begin + corrugation.length
     return [
@@ -127,7 +127,7 @@ def _stacked(arrays):
     return np.array([np.pad(array, [(0, more) for more in sizes - array.shape]) for array in arrays])
 
 
-def with_own_arrays(geometry):
+def with_copied_arrays(geometry):
     """A `ContactGeometry` with arrays of its own where sections are written."""
     names = "rail", "scan_rail", "along", "zone_gaps"
     return geometry._replace(**{name: getattr(geometry, name).copy() for name in names})
@@ -150,7 +150,7 @@ def lay_sections(model, state, work):
             if table != known[TABLE]:
                 known[:] = math.nan
                 known[TABLE] = table
-            place, share = _place_of(laid, s + laid[LEAD] * yaw), 1.0
+            place, share = _section_index(laid, s + laid[LEAD] * yaw), 1.0
             if laid[PERIOD] > 0.0:
                 share = abs(s - laid[START]) / laid[FADE]
                 if laid[END] < math.inf:
@@ -212,7 +212,7 @@ def _passed(crossing, k, wheel, s, yaw):
 
 
 @jit(allocates=False, forceinline=True)
-def _place_of(laid, s):
+def _section_index(laid, s):
     """Place of an arc length (m) among the sections, in steps; of a wheel's from `PAD` to a turn beyond it."""
     place = (s - laid[BEGIN]) / laid[STEP]
     return PAD + (place - PAD) % laid[PERIOD] if laid[PERIOD] > 0.0 else place
@@ -225,7 +225,7 @@ def interpolate(sections, strips, laid, place, yaw, share, scratch, geometry, cu
     of 1 it goes over into the plain rail. ``scratch`` is (ROWS + 4, m)."""
     rail, along, cells = geometry.rail, geometry.along, (geometry.rail.shape[0] - 1) // PER_CELL
     low, high = max(int(low) - MARGIN, 0), min(int(high) - MARGIN, cells)
-    first, size = PER_CELL * max(low - BESIDE, 0), min(PER_CELL * (high + BESIDE) + 2, rail.shape[0])
+    first, size = PER_CELL * max(low - NEIGHBOUR_CELLS, 0), min(PER_CELL * (high + NEIGHBOUR_CELLS) + 2, rail.shape[0])
     last, begin = int(laid[LAST]) - 1, first
     while begin < size:  # runs of nodes between the same two sections
         i, end = _step_of(place + yaw * strips[1, begin], last), begin + 1
@@ -344,7 +344,7 @@ def _unchanged(laid, s):
     end = laid[BEGIN] + laid[STEP] * laid[LAST]
     left = max(laid[BEGIN] - s, s - end, laid[STRIDE])
     if laid[PERIOD] > 0.0:
-        place, left = _place_of(laid, s), laid[STRIDE]
+        place, left = _section_index(laid, s), laid[STRIDE]
         if place > laid[LAST]:
             left = max((PAD + laid[PERIOD] - place) * laid[STEP], left)
         if laid[END] < math.inf:

@@ -94,7 +94,7 @@ def press_check_rails(model, state, work):
 
 
 @jit(allocates=False)
-def shorten_beside(model, state, work, clock, at):
+def shorten_near_check_rails(model, state, work, clock, at):
     """As `shorten_step`, and for wheelsets that come to a check rail or are beside one."""
     shorten_step(model, state, work, clock, at)
     for k in range(work.motions.shape[0]):

@@ -117,7 +117,7 @@ def rails_at(model, state, k):
 
 
 @jit(allocates=False, forceinline=True)
-def first_place(model, k):
+def first_state_index(model, k):
     """Place of the first state of the track under the k-th wheelset in the state."""
     track = model.flexible_track
     size = track.mass.shape[0] * (1 if track.mass[0] == 0.0 else 2)
@@ -129,7 +129,7 @@ def displacement(model, state, k, wheel):
     """How far the rail under a wheel is displaced to the left and up, m."""
     if model.flexible_track.mass.shape[0] == 0:
         return 0.0, 0.0
-    at = first_place(model, k) + 2 * wheel
+    at = first_state_index(model, k) + 2 * wheel
     return state[at], state[at + 1]
 
 
@@ -151,7 +151,7 @@ def _find_wrenches(model, state, work, mode):
         mode &= ~BARE
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
-            at, motion = first_place(model, k) + i, work.motions[k, i // 2]
+            at, motion = first_state_index(model, k) + i, work.motions[k, i // 2]
             motion[MOTION.y + i % 2] -= state[at]
             scratch.ground[k, i] = motion[MOTION.vy + i % 2]
             if not massless:
@@ -169,7 +169,7 @@ def _find_wrenches(model, state, work, mode):
         _give_way(model, state, work, mode)
     scratch.power[0] = 0.0
     for k in range(scratch.speeds.shape[0]):
-        at = first_place(model, k)
+        at = first_state_index(model, k)
         for i in range(RAILS):
             scratch.power[0] += scratch.forces[k, i] * scratch.speeds[k, i]
         for wheel in range(0 if mode & BARE else 2):
@@ -199,7 +199,7 @@ def _write_rates(model, state, work, rate):
     track, scratch = model.flexible_track, work.flexible_track
     d, massless = track.mass.shape[0], track.mass[0] == 0.0
     for k in range(scratch.speeds.shape[0]):
-        at = first_place(model, k)
+        at = first_state_index(model, k)
         for i in range(RAILS if massless else 0):
             rate[at + i] = scratch.speeds[k, i]
         for i in range(0 if massless else d):
@@ -308,7 +308,7 @@ def _find_residuals(model, state, scratch):
     track, out = model.flexible_track, False
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
-            spring = track.stiffness[i, i] * state[first_place(model, k) + i]
+            spring = track.stiffness[i, i] * state[first_state_index(model, k) + i]
             damper, force = track.damping[i, i] * scratch.speeds[k, i], scratch.forces[k, i]
             left = spring + damper - force
             scratch.residuals[k, i] = left

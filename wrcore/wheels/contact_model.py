@@ -52,7 +52,7 @@ class ContactModel(NamedTuple):
     """Trained network of exact contact, if the scene asks for it."""
 
 
-def alone(contact, **more):
+def without_wheels(contact, **more):
     """A `ContactModel` without what its wheels have of their own, and ``more`` in it."""
     return contact._replace(geometries=(), plain=(), wheels=np.zeros(0, np.int64), **more)
 

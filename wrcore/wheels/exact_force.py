@@ -11,7 +11,7 @@ from wrcore.bodies.vector import copy_into
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal.gap import frame_of_rows, group_end, lean_of
 from wrcore.contact.normal.strips import FIXED, WEIGHT, WIDENED
-from wrcore.contact.normal.windows import MORE
+from wrcore.contact.normal.windows import BLENDING_RATIO
 from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
 from wrcore.contact.patch.model import LOAD
 from wrcore.contact.patch.solution import NOTHING, fill_row, mean_solution, roll_on_grid, roll_patch, solve_overlaps
@@ -85,7 +85,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
         fixed = finer[FIXED]
         found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work)
         if share > 0.0:  # the mean with more strips
-            finer[WIDENED] = MORE
+            finer[WIDENED] = BLENDING_RATIO
             windows, frame = solve_overlaps(model, pose, low, high, memory, work)
             finer[WIDENED] = 1.0
             if windows > 0:

@@ -12,8 +12,8 @@ from wrcore.contact.search.approach import Pressed
 from wrcore.contact.search.reduction import PATCH_COLUMNS
 from wrcore.contact.search.strip import Pose
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of
-from wrcore.kernels.told import handed_on, interrupted, told_if_long
-from wrcore.wheels.contact_model import COUNTERS, alone
+from wrcore.kernels.told import handed_on, interrupted, say_if_long
+from wrcore.wheels.contact_model import COUNTERS, without_wheels
 from wrcore.wheels.exact_force import add_group
 from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.modes import FRESH
@@ -28,7 +28,7 @@ def with_fallback(contact):
     """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
     m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
     fallback = Kernel(
-        solve_on_grid, Kind(alone(contact)), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
+        solve_on_grid, Kind(without_wheels(contact)), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
         np.zeros(PATCH_COLUMNS),
     )  # fmt: skip
     return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
@@ -59,7 +59,7 @@ def _with_own(contact):
 def _of_patches(kernel, contact, work):
     """Address of a kernel of patches."""
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
-    kind, counters = Kind(alone(contact)), np.zeros(COUNTERS, np.int64)
+    kind, counters = Kind(without_wheels(contact)), np.zeros(COUNTERS, np.int64)
     return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
 
 
@@ -82,7 +82,7 @@ class LateKernels:
             return
         what = {ELLIPSES: "ellipses", LOBES: "lobes that are apart"}.get(which, "the solver of exact contact")
         text = f"{what}: compiled, once, for {'some minutes' if which == KERNEL else 'seconds'} of one core; {WITHOUT}"
-        with handed_on("it has no solver"), told_if_long(text):
+        with handed_on("it has no solver"), say_if_long(text):
             if which == ELLIPSES:
                 self._places[ELLIPSES] = self._with_ellipses()
             elif which == LOBES:
@@ -96,7 +96,7 @@ class LateKernels:
 
     def _of_lobes(self):
         m, pressed, lift = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pressed, Lift))
-        kind, work = Kind(alone(self._contact)), Kind(strip_work(self._contact.strips, 1))
+        kind, work = Kind(without_wheels(self._contact)), Kind(strip_work(self._contact.strips, 1))
         counters = np.zeros(COUNTERS, np.int64)
         return Kernel(look_lobes_up, kind, m, pressed, lift, (0.0, 0.0), 0.0, counters, work).address
 

@@ -51,7 +51,7 @@ _MOST_LOG_LOAD, _MOST_LOG_AXIS, _MOST_ANGLE = 0.6, 0.8, 0.15
 """Bounds of what the network adds to ln N, ln a and ln b, and to the contact angle (rad). In training 99.9 % of the
 corrections are below half of them."""
 
-_MOST_PLACE, _MOST_WIDTH = 3.0, 3.0
+_MOST_SHIFT, _MOST_WIDTH = 3.0, 3.0
 """Bounds of the place across the patch over sigma, and half of that of the variance of its width over sigma^2; a
 parabolic overlap has 0 and 1.4."""
 
@@ -219,7 +219,7 @@ def _pressed(model, shape, trust, scales, outputs):
     load *= math.exp(bounded(scales[0] * outputs[0], _MOST_LOG_LOAD))
     log_a = math.log(a) + bounded(scales[1] * outputs[1], _MOST_LOG_AXIS)
     log_b = math.log(b) + bounded(scales[2] * outputs[2], _MOST_LOG_AXIS)
-    e = bounded(scales[5] * outputs[5] * size / shape.sigma, _MOST_PLACE)
+    e = bounded(scales[5] * outputs[5] * size / shape.sigma, _MOST_SHIFT)
     b = math.exp(log_b) / shape.sigma
     spread = bounded(0.2 * b * b, 2.0 * _MOST_WIDTH)
     angle = parabola_at(shape.angle, shape.angle_1, shape.angle_2, shape.third, e, spread)

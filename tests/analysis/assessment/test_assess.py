@@ -17,7 +17,7 @@ from wrcore.analysis.assessment.assess import (
     sliding_mean,
     track_sections,
 )
-from wrcore.analysis.assessment.wheels import late_in
+from wrcore.analysis.assessment.wheels import output_times_after
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.output.run import Run
@@ -268,7 +268,7 @@ def test_a_run_without_what_it_takes_is_refused():
         with pytest.raises(InputError, match=f"begin: expected {says}"):
             wr.assess(run, begin=begin)
     with pytest.raises(InputError, match="expected output times"):
-        late_in(Run(run.scene, "failed", "at once", run.t[:0], {}), 0.0, "x")
+        output_times_after(Run(run.scene, "failed", "at once", run.t[:0], {}), 0.0, "x")
     slow = Run(run.scene, "completed", "", run.t[::5], {})
     with pytest.raises(InputError, match=r"output.rate.*at least 1000 1/s in the scene, got 200"):
         section_table(slow)

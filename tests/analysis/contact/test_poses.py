@@ -14,7 +14,7 @@ from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.analysis.contact.poses import STILL, loaded_poses
 from wrcore.cli import main
 from wrcore.contact.hertz import contact_modulus, hertz_table
-from wrcore.contact.rigid.height_at_load import wheel_at_rest
+from wrcore.contact.rigid.height_at_load import static_wheel_force
 from wrcore.contact.rigid.pose_file import read_poses
 from wrcore.contact.search import reduction as columns
 from wrcore.geometry.track import SIDES
@@ -121,7 +121,7 @@ def test_still_ellipses_are_what_they_were(tmp_path, benchmark_pair):
             y, yaw = poses.set_index("pose_id").loc[pose, ["y_m", "yaw_rad"]]
             z, roll = own[["z_wheelset_m", "roll_rad"]].iloc[0]
             rows = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
-            count, force = wheel_at_rest(
+            count, force = static_wheel_force(
                 benchmark_pair, hertz_table(), contact_modulus(8.2e10, 0.28), SIDES[side], y, z, roll, yaw, True,
                 columns.REDUCTIONS[reduction], rows,
             )  # fmt: skip

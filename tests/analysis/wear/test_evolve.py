@@ -27,10 +27,10 @@ from wrcore.analysis.wear.worn_profiles import (
 from wrcore.analysis.wear.worn_rails import (
     FACE_SLOPE,
     filled,
-    laid_rails,
     lay_rails,
     next_rails,
     rail_file,
+    rails_of_step,
     softened,
     worn_down,
 )
@@ -497,7 +497,7 @@ def ground_down(folder, scene, low, high, steps):
         band = (u < 0.0) & (f < f.max() - low) & (f > f.max() - high)
         fall = smooth_along(u, f, np.where(band, 1e-4 * np.hypot(1.0, np.gradient(f, u)), 0.0), 2e-3)
         next_rails(folder, step, [{"left": fall, "right": np.zeros(fall.size)}], 1.0, False)
-    return laid_rails(folder, steps, 0, scene)
+    return rails_of_step(folder, steps, 0, scene)
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.008, 0.014), (0.009, 0.015), (0.005, 0.020)])
@@ -520,16 +520,16 @@ def test_a_stored_rail_that_a_curve_cannot_follow_is_refused(tmp_path):
     edge = (u < 0.0) & (depth > 0.009) & (depth < 0.013)
     write_points(path, u, np.where(edge, f.max() - 0.013, f))
     with pytest.raises(InputError, match=r"laid_0_left_000.csv.*gauge face that a curve f\(u\) follows"):
-        laid_rails(tmp_path, 0, 0, scene)
+        rails_of_step(tmp_path, 0, 0, scene)
 
 
 def test_worn_rails_keep_their_place(curves):
     """What wears lies lower and farther from the other rail; what does not stays where it was, to 1 um."""
     folder, _ = curves["left"]
     _, (scene,) = ev.load_wear_plan(curved(400))
-    new, worn = (load_scene(scene, laid_rails(folder, step, 0, scene).changes) for step in (0, 3))
+    new, worn = (load_scene(scene, rails_of_step(folder, step, 0, scene).changes) for step in (0, 3))
     places = [[s.track.rail_distance(pair.rail) for pair in s.pairs[:2]] for s in (new, worn)]
-    shifts = [laid_rails(folder, step, 0, scene).shifts for step in (0, 3)]
+    shifts = [rails_of_step(folder, step, 0, scene).shifts for step in (0, 3)]
     for k, side in enumerate(("left", "right")):
         moved = places[1][k] - shifts[1][side] - places[0][k] + shifts[0][side]
         assert abs(moved) < 1e-6

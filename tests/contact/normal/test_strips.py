@@ -13,7 +13,7 @@ from wrcore.contact.grid.grid import grid_normal
 from wrcore.contact.hertz import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.normal import gap
 from wrcore.contact.normal.solve import even_length
-from wrcore.contact.normal.strips import FIXED, GUESSED, KEPT, MEMORY, PLACE, STEPS, STRIPS_FROM
+from wrcore.contact.normal.strips import FIXED, GUESSED, KEPT, MEMORY, STEPS, STRIPS_FROM, WHEEL_POSITION
 from wrcore.contact.rigid.height_at_load import height_at_load
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search.detection import axle_direction, detect, find_patches
@@ -170,10 +170,10 @@ def test_windows_that_were_not_found_are_sought_again_elsewhere():
         warm = forces(contact, [pose], warm=True)
         memory, fixed = contact._memories["left", 0].copy(), contact._work.more[FIXED]
         (cold,) = forces(NormalContact(contact.geometry, MODULUS, "coarse"), [pose], warm=False)
-        known.append(memory[0] < 0.0 and at == memory[PLACE])
+        known.append(memory[0] < 0.0 and at == memory[WHEEL_POSITION])
         assert fixed == (memory[0] < 0.0)
         assert warm == pytest.approx([cold], rel=5e-3 if known[-1] else 1e-6)
-        at = memory[PLACE]
+        at = memory[WHEEL_POSITION]
     assert not known[0] and 2 <= sum(known) <= 10
 
 
@@ -187,15 +187,18 @@ def test_fixed_strips_go_on_from_the_last_ones():
     lifted = [(y, z + k * 1e-6, 0.0) for k in range(1, 6)]
     apart = forces(light, lifted, warm=True) / forces(deep, lifted, warm=False) - 1.0
     memory = light._memories["left", 0]
-    assert memory[0] < 0.0 < memory[KEPT] and memory[PLACE + 1] < z + 1e-6
+    assert memory[0] < 0.0 < memory[KEPT] and memory[WHEEL_POSITION + 1] < z + 1e-6
     assert 1e-6 < np.abs(apart).max() < 5e-3  # their strips lie elsewhere
-    memory[PLACE + 2] += 0.1  # of a frame that has turned since: places in it are others
+    memory[WHEEL_POSITION + 2] += 0.1  # of a frame that has turned since: places in it are others
     np.testing.assert_allclose(forces(light, lifted[-1:], warm=True), forces(deep, lifted[-1:], warm=False), rtol=1e-9)
     deep._memories.clear()
     cold = forces(deep, [(y, z - 6e-5, 0.0)], warm=True)
     there = deep._memories["left", 0]
     assert there[0] < 0.0 and cold > 4.0 * again[0]
-    memory[1:4], memory[GUESSED:STRIPS_FROM] = there[1:4], [there[GUESSED], memory[KEPT], *there[PLACE:STRIPS_FROM]]
+    memory[1:4], memory[GUESSED:STRIPS_FROM] = (
+        there[1:4],
+        [there[GUESSED], memory[KEPT], *there[WHEEL_POSITION:STRIPS_FROM]],
+    )
     np.testing.assert_allclose(forces(light, [(y, z - 6e-5, 0.0)], warm=True), cold, rtol=1e-6)
 
 

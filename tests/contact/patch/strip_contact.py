@@ -10,7 +10,7 @@ from wrcore.contact.normal import solve
 from wrcore.contact.normal.gap import group_end, rigid_slip
 from wrcore.contact.normal.influence import influence_table
 from wrcore.contact.normal.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, normal_work
-from wrcore.contact.normal.windows import MORE
+from wrcore.contact.normal.windows import BLENDING_RATIO
 from wrcore.contact.rigid.height_at_load import height_of_zero
 from wrcore.contact.search.detection import axle_direction, find_patches
 from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
@@ -99,7 +99,7 @@ class NormalContact:
         windows, frame, strips, sums = self._on_strips(pose, first, last, memory)
         share = self._work.more[WEIGHT]
         if share > 0.0:  # the mean with a solution on more strips; the strips of the one that weighs more
-            self._work.more[WIDENED] = MORE
+            self._work.more[WIDENED] = BLENDING_RATIO
             more, _, finer, others = self._on_strips(pose, first, last, memory)
             self._work.more[WIDENED] = 1.0
             if more:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrcore.contact.hertz import contact_modulus, hertz_table
-from wrcore.contact.rigid.height_at_load import settle, wheel_at_rest
+from wrcore.contact.rigid.height_at_load import settle, static_wheel_force
 from wrcore.contact.search.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS
 
 MODULUS = 0.9 * contact_modulus(8.2e10, 0.28)
@@ -13,7 +13,7 @@ MODULUS = 0.9 * contact_modulus(8.2e10, 0.28)
 def forces(pair, y, z, roll, yaw, reduction):
     patches = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     arguments = (y, z, roll, yaw, True, reduction, patches)
-    return np.array([wheel_at_rest(pair, hertz_table(), MODULUS, side, *arguments)[1] for side in (1.0, -1.0)])
+    return np.array([static_wheel_force(pair, hertz_table(), MODULUS, side, *arguments)[1] for side in (1.0, -1.0)])
 
 
 def settled(pair, *pose_and_load):

@@ -11,7 +11,7 @@ from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES, pair_with_waves
 from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.hertz import contact_modulus, hertz_table
-from wrcore.contact.rigid.height_at_load import height_at_load, settle, wheel_at_rest
+from wrcore.contact.rigid.height_at_load import height_at_load, settle, static_wheel_force
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search.detection import axle_direction, detect, find_patches, planar_error_bound
 from wrcore.contact.search.reduction import (
@@ -301,7 +301,7 @@ def test_no_overlap_of_measured_profiles_counts_twice(reduction):
     several = 0
     for y in np.linspace(-8e-3, 8e-3, 401):
         z = height_at_load(pair, hertz, modulus, 1.0, y, 0.0, 0.0, True, reduction, 54e3, 0.46, rows)
-        count, _ = wheel_at_rest(pair, hertz, modulus, 1.0, y, z, 0.0, 0.0, True, reduction, rows)
+        count, _ = static_wheel_force(pair, hertz, modulus, 1.0, y, z, 0.0, 0.0, True, reduction, rows)
         several += count > 1
         assert count > 0 and np.all(np.diff(rows[:count, U_WHEEL]) > 1e-5)
         assert np.all(1.5 * rows[:count, NORMAL] < 1e10 * math.pi * rows[:count, SEMI_A] * rows[:count, SEMI_B])
@@ -359,7 +359,7 @@ def test_force_is_continuous_with_moments(benchmark_pair):
         z = settle(benchmark_pair, benchmark_pair, hertz_table(), modulus, 0.0, 0.0, True, reduction, 54546.0, 0.46)[1]
         force = [
             sum(
-                wheel_at_rest(benchmark_pair, hertz_table(), modulus, s, y, z, 0.0, 0.0, True, reduction, rows)[1]
+                static_wheel_force(benchmark_pair, hertz_table(), modulus, s, y, z, 0.0, 0.0, True, reduction, rows)[1]
                 for s in (1.0, -1.0)
             )
             for y in np.arange(-3e-3, 3e-3, 1e-6)

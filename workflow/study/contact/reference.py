@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from study.contact.tables import MATERIAL
 from wrcore.contact.hertz import contact_modulus, hertz_table
-from wrcore.contact.rigid.height_at_load import height_at_load, wheel_at_rest
+from wrcore.contact.rigid.height_at_load import height_at_load, static_wheel_force
 from wrcore.contact.search.reduction import (
     ANGLE,
     MAX_PATCHES,
@@ -91,7 +91,7 @@ def _compare_case(geometry, case, reduction, spatial):
 
 def _forces(wheel, pose, z, patches):
     """Normal forces of a wheel at height ``z``; fills ``patches``."""
-    count, _ = wheel_at_rest(*wheel, z, *pose, patches)
+    count, _ = static_wheel_force(*wheel, z, *pose, patches)
     return patches[:count, NORMAL]
 
 

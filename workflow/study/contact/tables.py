@@ -12,7 +12,7 @@ from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.hertz import contact_modulus, hertz_table
 from wrcore.contact.rigid.conicity import conicity_curve
 from wrcore.contact.rigid.first_touch import first_touch
-from wrcore.contact.rigid.height_at_load import height_at_load, settle, wheel_at_rest
+from wrcore.contact.rigid.height_at_load import height_at_load, settle, static_wheel_force
 from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.contact.search.detection import planar_error_bound
 from wrcore.contact.search.reduction import (
@@ -131,7 +131,7 @@ def _planar_errors(geometry, hertz, modulus, load, shifts, yaws, out):
                                rows)  # fmt: skip
             if np.isnan(z):
                 continue
-            count, _ = wheel_at_rest(geometry, hertz, modulus, 1.0, y, z, 0.0, yaw, True, MAXIMUM, rows)
+            count, _ = static_wheel_force(geometry, hertz, modulus, 1.0, y, z, 0.0, yaw, True, MAXIMUM, rows)
             k = np.argmax(rows[:count, NORMAL])
             ex, ey = -math.sin(yaw), math.cos(yaw)
             spatial, planar = make_pose(1.0, y, z, ex, ey, 0.0, True), make_pose(1.0, y, z, ex, ey, 0.0, False)
@@ -189,7 +189,9 @@ def _sweep(geometry, hertz, modulus, y, z, spatial, reduction, force):
         force[i] = 0.0
         for wheel in range(2):
             side = 1.0 - 2.0 * wheel
-            force[i] += wheel_at_rest(geometry, hertz, modulus, side, y[i], z, 0.0, 0.0, spatial, reduction, rows)[1]
+            force[i] += static_wheel_force(geometry, hertz, modulus, side, y[i], z, 0.0, 0.0, spatial, reduction, rows)[
+                1
+            ]
 
 
 def lateral_sweep(geometry, reach, step, load, detection="spatial"):
@@ -227,7 +229,7 @@ def sweep_jumps(sweep, reaches):
 def _force_over_depth(geometry, hertz, modulus, y, yaw, heights, reduction, out):
     rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     for i in range(heights.shape[0]):
-        count, force = wheel_at_rest(geometry, hertz, modulus, 1.0, y, heights[i], 0.0, yaw, True, reduction, rows)
+        count, force = static_wheel_force(geometry, hertz, modulus, 1.0, y, heights[i], 0.0, yaw, True, reduction, rows)
         out[i] = np.nan
         out[i, 0], out[i, 1], out[i, 2] = heights[i], count, force
         for k in range(count):

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from study.hard_cases.cases import Check, prepare, rows, run, sound
-from wrcore.analysis.stability.stability import LARGEST_REST, straight_ahead
+from wrcore.analysis.stability.stability import LARGEST_RESIDUAL, straight_ahead
 from wrcore.balance.linear import steady_running
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.joint import evaluate_joints
@@ -178,7 +178,7 @@ def _largest_step(setting, method, guess, longest):
         places = _velocities(setting.model)
         apart = np.max(np.abs(other.states[-1] - one.states[-1])[places])
         moved = np.max(np.abs(one.states[-1] - setting.state)[places])
-        still = UNSTEADY * setting.model.speed + SETTLING + LARGEST_REST * times[-1]
+        still = UNSTEADY * setting.model.speed + SETTLING + LARGEST_RESIDUAL * times[-1]
         return bool(apart < GROWTH * DISTURBANCE and moved < still), one
 
     low, high = guess / 1.5, min(guess * 1.5, longest)

@@ -18,7 +18,7 @@ import numpy as np
 
 from study.surrogate.finding import LIMITS, LOAD, LOG_A, LOG_B, P_MAX, PLACE, fill_base, find_described, first_touch
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.contact.normal.windows import MORE
+from wrcore.contact.normal.windows import BLENDING_RATIO
 from wrcore.contact.patch.model import strip_work, with_tables
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.contact.search.reduction import MAX_PATCHES, PATCH_COLUMNS
@@ -29,12 +29,12 @@ from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
-from wrcore.wheels.contact_model import alone
+from wrcore.wheels.contact_model import without_wheels
 from wrcore.wheels.surrogate_force import (
     _MOST_ANGLE,
     _MOST_LOG_AXIS,
     _MOST_LOG_LOAD,
-    _MOST_PLACE,
+    _MOST_SHIFT,
     _MOST_WIDTH,
     bounded,
 )
@@ -120,7 +120,7 @@ def _template():
     """`ContactModel` of exact contact at the resolution ``middle`` with the creep table, of any pair."""
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
     exact, table = (LoadedWheels(pair.geometry, name, "middle").contact for name in ("exact", "surrogate"))
-    return alone(exact, law=LAWS["table"], creep=table.creep, strips=with_tables(exact.strips), damping=1.0)
+    return without_wheels(exact, law=LAWS["table"], creep=table.creep, strips=with_tables(exact.strips), damping=1.0)
 
 
 @lru_cache(maxsize=1)
@@ -175,7 +175,7 @@ class ExactPatches:
         y, z, *axle = found.position
         free = np.array([1.0, 0.0, 0.0, *(np.array(axle) / self.model.geometry.rolling_radius)])
         sums, each, pressed = np.zeros(SUMS), np.zeros(SUMS), []
-        for work, more in zip(_works(), (1.0, MORE), strict=True):
+        for work, more in zip(_works(), (1.0, BLENDING_RATIO), strict=True):
             windows, frame, share = press_lobe(
                 self._handle, y, z, tuple(axle), found.numbers[PLACE], LIMITS, free, more, each, work
             )
@@ -256,7 +256,7 @@ class ExactPatches:
                 unbounded(log_b - base[LOG_B], _MOST_LOG_AXIS),
                 unbounded(log_peak - math.log(base[P_MAX]), 2.0 * _MOST_LOG_AXIS),
                 unbounded((slip[0] - ahead) / shape.length, 1.0),
-                unbounded(e, _MOST_PLACE) * shape.sigma / shape.length,
+                unbounded(e, _MOST_SHIFT) * shape.sigma / shape.length,
                 unbounded(angle - of_angle, _MOST_ANGLE),
                 unbounded((slip[2] - height) / shape.length, 1.0),
             ]

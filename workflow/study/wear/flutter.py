@@ -14,7 +14,7 @@ import numpy as np
 
 from wrcore.analysis.wear.evolve import load_wear_plan
 from wrcore.analysis.wear.worn_profiles import file_of
-from wrcore.analysis.wear.worn_rails import laid_rails
+from wrcore.analysis.wear.worn_rails import rails_of_step
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
@@ -41,7 +41,7 @@ def worn_scene(plan, folder, step, place, changes):
     if not 0 <= place < len(scenes):
         raise InputError(plan, "scenes", f"expected a scene from 0 to {len(scenes) - 1}, got {place}")
     wheel = {"wheel.profile": {"points": str(file_of(folder, "profile", step).resolve()), "unit": "m"}}
-    laid = laid_rails(folder, step, place, scenes[place]).changes
+    laid = rails_of_step(folder, step, place, scenes[place]).changes
     return load_scene(scenes[place], {**wheel, **laid, "output.channels": ["pose", "contact"]})
 
 

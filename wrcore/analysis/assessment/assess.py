@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.assessment.ride import rate_of, ride_table, whole_body_table
-from wrcore.analysis.assessment.wheels import late_in, wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.wheels import output_times_after, wheel_forces, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
@@ -274,7 +274,7 @@ def section_table(run, begin=0.0):
     side from ``begin`` (s) on, Q0 (N) by wheelset, its mean Q over the whole run, and the filtered quantities (a column
     each) over time from ``begin`` on.
     """
-    rate, late = rate_of(run, LEAST_RATE, "EN 14363"), late_in(run, begin, "EN 14363")
+    rate, late = rate_of(run, LEAST_RATE, "EN 14363"), output_times_after(run, begin, "EN 14363")
     wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]
     if not wheels or not all(wheel.follows("Q_N") and wheel.follows("Y_N") for wheel in wheels):
         raise InputError("EN 14363", "run", "expected the channels of contacts, or Q and Y, of wheels")

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.assessment.wheels import late_in, wheelsets_of
+from wrcore.analysis.assessment.wheels import output_times_after, wheelsets_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import track_frame
 from wrcore.run.motion import path_of
@@ -197,7 +197,7 @@ def whole_body_table(run, begin=0.0):
 
 def _bodies(run, begin, least):
     """Output rate, times that count, and the bodies without wheels that have poses and accelerations."""
-    rate, late = rate_of(run, LEAST_RATE, "ride"), late_in(run, begin, "ride")
+    rate, late = rate_of(run, LEAST_RATE, "ride"), output_times_after(run, begin, "ride")
     bodies = [group for group in run if group not in wheelsets_of(run) and set(NEEDED) <= set(run[group])]
     if not bodies:
         raise InputError("ride", "channels", f"expected a body without wheels that has {', '.join(NEEDED)}")

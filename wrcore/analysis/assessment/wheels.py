@@ -24,7 +24,7 @@ def wheelsets_of(run):
     return [name for name in run.groups if f"{name}/left" in run.groups]
 
 
-def late_in(run, begin, what):
+def output_times_after(run, begin, what):
     """Which output times of a run an evaluation that begins at a time (s) counts, shape (n,); others are refused."""
     if not len(run.t):
         raise InputError(what, "run", "expected output times, but it ended before the first")
@@ -122,7 +122,7 @@ def creep_power(run: Run, wheelset: str, side: Side) -> np.ndarray:
     return run[f"{wheelset}/{side}"].creep_power_W
 
 
-def greatest_pressure(run, wheelset, side):
+def maximum_pressure(run, wheelset, side):
     """Greatest pressure under a wheel over time, Pa, shape (n,), 0 without contact; of ellipses 3 N/(2 pi a b)."""
     return np.max(np.nan_to_num(run[f"{wheelset}/{side}"].p_max_Pa), axis=1)
 
@@ -158,7 +158,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
             f"T_gamma_{side}_N": wear_number(run, wheelset, side),
             f"T_gamma_spin_{side}_N": wear_number(run, wheelset, side, spin=True),
             f"creep_power_{side}_W": creep_power(run, wheelset, side),
-            f"p_max_{side}_Pa": greatest_pressure(run, wheelset, side),
+            f"p_max_{side}_Pa": maximum_pressure(run, wheelset, side),
         }
     return pd.DataFrame(columns | {"sum_Y_N": run[wheelset].sum_Y_N}, index=pd.Index(run.t, name="t_s"))
 
@@ -188,7 +188,7 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     """
     if not wheelsets_of(run):
         raise InputError("wheel_table", "run", "expected the channels of wheels")
-    late, rows = late_in(run, begin, "wheel_table"), []
+    late, rows = output_times_after(run, begin, "wheel_table"), []
     for wheelset in wheelsets_of(run):
         share = way_shares(run, wheelset, late)
         for side in SIDES:

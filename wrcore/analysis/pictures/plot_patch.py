@@ -16,7 +16,7 @@ from wrcore.scene.description import Source
 
 TALLEST = 12.0  # height that the greatest pressure is drawn with, mm
 ARROW = 22.0  # length of the arrow of the most loaded patch's force, mm
-SEEN = (-34.0, 30.0)  # heights between which wheel and rail are shown, mm
+SHOWN_HEIGHTS = (-34.0, 30.0)  # heights between which wheel and rail are shown, mm
 
 
 @checked
@@ -74,14 +74,17 @@ def _section(axes, pair, side, patches):
     wheel = y + across * np.cos(roll) - height * np.sin(roll), z + across * np.sin(roll) + height * np.cos(roll)
     u = np.linspace(pair.rail.u[0], pair.rail.u[-1], 600)
     rail = sign * (pair.rail_distance + u), pair.rail(u)
-    for (across, height), ends, color, name in ((wheel, SEEN[1], WHEEL, "wheel"), (rail, SEEN[0], RAIL, "rail")):
+    for (across, height), ends, color, name in (
+        (wheel, SHOWN_HEIGHTS[1], WHEEL, "wheel"),
+        (rail, SHOWN_HEIGHTS[0], RAIL, "rail"),
+    ):
         edge = np.column_stack([MM * across, MM * height])
         body = np.vstack([[edge[0, 0], ends], edge, [edge[-1, 0], ends]])
         axes.add_patch(Polygon(body, facecolor="0.88" if ends < 0.0 else "0.95", edgecolor="none", zorder=0))
         axes.plot(*edge.T, color=color, linewidth=1.6, label=name)
     _pressure(axes, patches)
     _forces(axes, patches)
-    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", aspect="equal", xmargin=0, ylim=SEEN)
+    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", aspect="equal", xmargin=0, ylim=SHOWN_HEIGHTS)
     axes.invert_xaxis()  # from behind, left is on the left
     axes.grid(False)
 

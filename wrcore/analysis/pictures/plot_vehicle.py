@@ -164,7 +164,7 @@ def _draw_parts(axes, parts, view, upright):
     """A mark for each part, the line between its ends, and a stroke along the direction in which it acts; the marks'
     places (m) with the size of the largest one (points).
     """
-    places = _by_place(parts, upright)
+    places = _by_position(parts, upright)
     for (x, across), here in places.items():
         for k, (_, name, kind, _, ends, along) in enumerate(here):
             color = MARKS[kind]["color"]
@@ -179,7 +179,7 @@ def _draw_parts(axes, parts, view, upright):
     return {place: _size(len(here) - 1) for place, here in places.items()}
 
 
-def _by_place(parts, upright):
+def _by_position(parts, upright):
     """Parts by the place (m) of their middle in a view."""
     places = {}
     for part in parts:
@@ -205,7 +205,7 @@ def _names(bodies):
 
 def _numbers(parts):
     """Numbers and their places in the plan view; those of parts at one place stand together."""
-    return [(",".join(str(part.number) for part in here), place) for place, here in _by_place(parts, 1).items()]
+    return [(",".join(str(part.number) for part in here), place) for place, here in _by_position(parts, 1).items()]
 
 
 def _label(axes, texts, spots, scale):

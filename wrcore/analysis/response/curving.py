@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from wrcore.analysis.response.frequency_response import observable
 from wrcore.analysis.stability.stability import rising, straight_ahead
-from wrcore.balance.curve import Curve, CurveBalance, Turning, at_rest, solve_curve
-from wrcore.balance.initial import LARGEST_REST_ON_STRIPS
+from wrcore.balance.curve import Curve, CurveBalance, Turning, solve_curve, straight_balance
+from wrcore.balance.initial import LARGEST_RESIDUAL_ON_STRIPS
 from wrcore.bodies.body import EULER, STATE_SIZE, VELOCITY, angles
 from wrcore.bodies.marker import FRAME
 from wrcore.contact.search.reduction import CHANNELS
@@ -24,7 +24,7 @@ from wrcore.run.output.run import Run
 from wrcore.scene.description import Scene, Source, as_scene
 from wrcore.vehicle.description import GRAVITY
 
-LARGEST_REST = 1e-4
+LARGEST_RESIDUAL = 1e-4
 """A curve in which accelerations above this are left has no balance, m/s^2 or rad/s^2 (chosen: 1e-5 of gravity)."""
 
 CANT = Annotated[float, Within(0.0, 0.5, "m")]
@@ -120,8 +120,8 @@ class Curving:
             expected = "expected a coefficient that is the same all along each rail: a circle has no arc length"
             raise InputError(scene.source, "contact.friction", expected)
         self.turning = Turning(model, WIDENED[scene.data["track"]["widened"]])
-        self.limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
-        self.straight = at_rest(model, state)
+        self.limit = LARGEST_RESIDUAL_ON_STRIPS if model.contact.strips.strips else LARGEST_RESIDUAL
+        self.straight = straight_balance(model, state)
 
     def follow(self, curves):
         """Pairs of a curve's number and its `CurveBalance`, from the widest curve on, to the left and to the right."""

@@ -36,7 +36,7 @@ NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion
 OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
 LIGHT = 0.7  # damping ratio below which a mode can be hunting; other lateral motions of wheelsets creep back faster
 HUNTING = 0.05  # least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode
-ALONE = 0.9  # part of a family's motion that makes the front or the rear the only one that moves
+ONE_SIDED_SHARE = 0.9  # part of a family's motion that makes the front or the rear the only one that moves
 
 WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
 CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
@@ -59,8 +59,8 @@ def _phase(first, second, names):
     """How two parts move: one of them alone, by its name, or both in phase or in antiphase."""
     squares = [np.sum(np.abs(part) ** 2) for part in (first, second)]
     share = squares[0] / sum(squares)
-    if share > ALONE or share < 1.0 - ALONE:
-        return names[0 if share > ALONE else 1]
+    if share > ONE_SIDED_SHARE or share < 1.0 - ONE_SIDED_SHARE:
+        return names[0 if share > ONE_SIDED_SHARE else 1]
     return f"in {'phase' if np.real(np.sum(first) * np.conj(np.sum(second))) > 0.0 else 'antiphase'}"
 
 

@@ -21,7 +21,7 @@ from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
 from wrcore.track.track import TrackModel
 
-LARGEST_REST = 1e-3
+LARGEST_RESIDUAL = 1e-3
 """Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
 nothing balances, is a quarter of it."""
 
@@ -65,12 +65,12 @@ def steady_motion(model, state, speed):
     """
     motion = steady_running(*at_speed(model, state, speed))
     left = np.abs(motion.residual)
-    if not np.max(left) < LARGEST_REST:
+    if not np.max(left) < LARGEST_RESIDUAL:
         bodies = len(model.bodies.mass)
         whole, inner = np.split(np.abs(motion.basis @ motion.residual)[6 * bodies :], [6 * bodies])
         whole = whole.reshape(bodies, 6)
         whole[:, 0], whole[model.bodies.spins == 1, 4] = 0.0, 0.0  # along the track, and the spin that belongs to it
-        held = "" if max(np.max(whole), np.max(inner, initial=0.0)) >= LARGEST_REST else (
+        held = "" if max(np.max(whole), np.max(inner, initial=0.0)) >= LARGEST_RESIDUAL else (
             ", along the track, where nothing holds the vehicle against its rolling resistance: an element or joint"
             " between a body and the frame would"
         )  # fmt: skip

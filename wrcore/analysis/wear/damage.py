@@ -16,7 +16,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.assessment.wheels import greatest_pressure, late_in, way_shares, wear_number, wheelsets_of
+from wrcore.analysis.assessment.wheels import (
+    maximum_pressure,
+    output_times_after,
+    way_shares,
+    wear_number,
+    wheelsets_of,
+)
 from wrcore.analysis.pictures.style import styled
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, checked
@@ -85,7 +91,7 @@ def damage_table(
     """
     if not wheelsets_of(run):
         raise InputError("damage_table", "run", "expected the channels of wheels")
-    late, rows = late_in(run, begin, "damage_table"), []
+    late, rows = output_times_after(run, begin, "damage_table"), []
     for wheelset in wheelsets_of(run):
         share = way_shares(run, wheelset, late)
         for side in SIDES:
@@ -94,7 +100,7 @@ def damage_table(
                 "wheelset": wheelset, "side": side, "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
                 "rcf_damage_mean": share @ passage_damage(run, wheelset, side)[late], "FI_max": index.max(),
                 "share_above_shakedown": share @ (index > 0.0),
-                "p_max_Pa": greatest_pressure(run, wheelset, side)[late].max(),
+                "p_max_Pa": maximum_pressure(run, wheelset, side)[late].max(),
             })  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -121,7 +127,7 @@ def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: Annotated[float, A
     'utilised friction |T|/N'
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
-    axes, late, top = figure.subplots(), late_in(run, begin, "plot_shakedown"), 0.0
+    axes, late, top = figure.subplots(), output_times_after(run, begin, "plot_shakedown"), 0.0
     for wheelset in wheelsets_of(run):
         for side, mark in zip(SIDES, ("o", "^"), strict=True):
             pressure = run[f"{wheelset}/{side}"].p_max_Pa[late].ravel() / shear_yield

@@ -327,7 +327,7 @@ class SceneWear(NamedTuple):
     """Area of each rail's section, m^2 per million gross tonnes."""
     falls: dict[str, np.ndarray]
     """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
-    laid: worn_rails.LaidRails | None
+    laid: worn_rails.RailsOfStep | None
     """The rails, if they wear."""
     seconds: tuple[float, float]
     """Processor time of simulating and of local wear."""
@@ -368,7 +368,7 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
     path = file_of(folder, "profile", step).resolve()
     with untold():
-        laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
+        laid = worn_rails.rails_of_step(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
         with untold():

@@ -24,7 +24,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from wrcore.analysis.assessment.wheels import late_in, way_shares, wheelsets_of
+from wrcore.analysis.assessment.wheels import output_times_after, way_shares, wheelsets_of
 from wrcore.analysis.contact.in_run import WheelInRun, scene_in_run
 from wrcore.analysis.contact.loaded import GRIDS
 from wrcore.analysis.wear.wear_laws import DENSITY, LAWS, Sliding, check_friction, wear_law
@@ -140,7 +140,7 @@ def local_wear(
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):
         raise InputError("local_wear", "output.channels", "expected the channels of poses, for the rolling radius")
-    late = late_in(run, begin, "local_wear")
+    late = output_times_after(run, begin, "local_wear")
     wheels = [(name, side) for name in wheelsets_of(run) for side in SIDES]
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")

@@ -31,7 +31,7 @@ from wrcore.errors.checked_yaml import validate
 
 DENSITY = 7850.0  # of steel, kg/m^3
 
-_MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
+_MILD, _FLAT, _SEVERE = 5.3e-9, 10.4e6, 77.2e6
 """kg/m/m^2 per N/m^2, and the two bounds in N/m^2: 1 ug/m/mm^2 is 1e-3 kg/m/m^2."""
 
 
@@ -56,7 +56,7 @@ Law = Callable[[Sliding], np.ndarray]
 def sheffield(work):
     """Loss (kg per metre rolled and m^2) over friction's work per area (N/m^2): mild, flat, then rising steeply."""
     flat = _MILD * _FLAT
-    return np.where(work < _FLAT, _MILD * work, flat + 61.9e-9 * np.maximum(work - _MORE, 0.0))
+    return np.where(work < _FLAT, _MILD * work, flat + 61.9e-9 * np.maximum(work - _SEVERE, 0.0))
 
 
 def energy(work):

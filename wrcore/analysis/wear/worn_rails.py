@@ -19,7 +19,7 @@ from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 
 
-class LaidRails(NamedTuple):
+class RailsOfStep(NamedTuple):
     """The rails of a scene at a step."""
 
     changes: dict
@@ -109,8 +109,8 @@ def rail_file(folder, step, place, side, kind="rail"):
     return file_of(folder, f"{kind}_{place}_{side}", step)
 
 
-def laid_rails(folder, step, place, scene):
-    """`LaidRails` of a scene as they lie at the start of a step; ``place`` is the scene's in the plan."""
+def rails_of_step(folder, step, place, scene):
+    """`RailsOfStep` of a scene as they lie at the start of a step; ``place`` is the scene's in the plan."""
     changes, points, shifts, gauge = {}, {}, {}, 0.0
     for side, new in _new_rails(scene).items():
         path = rail_file(folder, step, place, side, "laid")
@@ -124,7 +124,7 @@ def laid_rails(folder, step, place, scene):
         shifts[side] = float(u[np.argmin(np.abs(f[: len(f) // 2] - f.max() - first[1]))] - first[0])
         gauge += scene.track.rail_distance(new) + shifts[side] - curve.gauge_offset(DEPTH)
         changes[f"rail.{side}"] = {"profile": {"points": str(path.resolve()), "unit": "m"}, "inclination": 0.0}
-    return LaidRails(changes | {"track.gauge": gauge, "track.gauge_depth": DEPTH}, points, shifts)
+    return RailsOfStep(changes | {"track.gauge": gauge, "track.gauge_depth": DEPTH}, points, shifts)
 
 
 def falls_of(laid, wheels, passages):

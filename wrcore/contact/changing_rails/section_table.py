@@ -52,7 +52,7 @@ beyond the ends of its profile, m."""
 COLUMNS = 9
 """Radii of the strips for which a wheel out of round is seen."""
 
-SEEN = [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]
+SECTION_ROWS = [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]
 
 PAD = 16
 """Nodes of a wheel out of round before its turn, or before and behind what is not round of it: a wheel that yaws sees
@@ -68,7 +68,7 @@ ROWS = 5
 
 
 @dataclass(frozen=True)
-class SeenTable:
+class SectionTable:
     """Sections over arc length, or over the angle of a wheel."""
 
     begin: float
@@ -86,8 +86,9 @@ class SeenTable:
     """(1 + stretches, ...): `ContactGeometry.zone_gaps` of the plain rail, then over each stretch."""
 
 
-def seen_table(pair, plain, backwards=False, lateral=None):
-    """`SeenTable` of a `WheelOnSlices` that goes over into a ``plain`` rail at both ends; ``backwards``: of one that is
+def section_table(pair, plain, backwards=False, lateral=None):
+    """`SectionTable` of a `WheelOnSlices` that goes over into a ``plain`` rail at both ends; ``backwards``: of one that
+    is
     laid the other way round, whose arc lengths then count from the same origin against those of its slices. All rails
     that the wheel passes lie between two ``lateral`` coordinates, m; left out: this one alone."""
     wide = _widened(pair)
@@ -115,7 +116,7 @@ def seen_table(pair, plain, backwards=False, lateral=None):
         sections[:, 1] *= -1.0
         sections[:, :, AHEAD] *= -1.0
     geometry = _plain_geometry(pair, plain, u, everywhere)
-    return _with_bounds(SeenTable(float(s[0]), step, sections, wide.strips(u), geometry, np.zeros(0)))
+    return _with_bounds(SectionTable(float(s[0]), step, sections, wide.strips(u), geometry, np.zeros(0)))
 
 
 def _step_along(rail):
@@ -127,7 +128,8 @@ def _step_along(rail):
 
 
 def shape_table(pair, shape):
-    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound` or a `SlicedWheel`, or the rail of a
+    """`SectionTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound` or a `SlicedWheel`, or the rail of
+    a
     `Corrugation`."""
     plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
     wide = _widened(WheelOnSlices(pair.wheel, RailSlices.of(plain), *sizes))
@@ -138,9 +140,9 @@ def shape_table(pair, shape):
     own = np.flatnonzero((at >= pair.wheel.u[0]) & (at <= pair.wheel.u[-1]))
     places = first + step * np.arange(count)
     if isinstance(shape, SlicedWheel):
-        seen = _seen_of_slices(wide, shape, places, u, at, own)
+        seen = _section_of_slices(wide, shape, places, u, at, own)
     else:
-        seen = _seen_of_radii(wide, shape, places, u, 1.0 / curvatures, own)
+        seen = _section_of_radii(wide, shape, places, u, 1.0 / curvatures, own)
     sections = np.zeros((count, 2, ROWS, u.size))
     everywhere = _plain_section(plain, u, plain.f.min() - BELOW)
     sections[:, 0] = everywhere
@@ -155,21 +157,21 @@ def shape_table(pair, shape):
         sections[k, 0] = everywhere
     strips = np.stack([curvatures, leads - at * shape.level])
     geometry = _plain_geometry(pair, plain, u, everywhere)
-    return _with_bounds(SeenTable(first, step, sections, strips, geometry, np.zeros(0)), faded=True)
+    return _with_bounds(SectionTable(first, step, sections, strips, geometry, np.zeros(0)), faded=True)
 
 
-def _seen_of_radii(wide, shape, places, u, radii, own):
+def _section_of_radii(wide, shape, places, u, radii, own):
     """Height, ahead and bend (n, 3, m) of a shape that is the same for all strips of a radius."""
     from scipy.interpolate import make_interp_spline
 
     known, some = np.unique(np.round(radii[own], 6), return_index=True)
     some = own[some[np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], COLUMNS)))]]
     at = radii[some]
-    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(at, place, x))[:, SEEN]
+    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(at, place, x))[:, SECTION_ROWS]
     return make_interp_spline(at, seen, k=min(3, at.size - 1), axis=2)(np.clip(radii, at[0], at[-1]))
 
 
-def _seen_of_slices(wide, shape, places, u, at, own):
+def _section_of_slices(wide, shape, places, u, at, own):
     """The same of a wheel of slices, strip by strip; beyond them as at their ends. ``at``: strips over ``u``, of which
     the wheel has its ``own``."""
     first, last = shape.within(at[own])
@@ -177,7 +179,7 @@ def _seen_of_slices(wide, shape, places, u, at, own):
     if some.size < 4:
         raise InputError(shape.slices.name, "", "expected profiles around the tape circle, u = 0, at all angles")
     reach = shape.reach_over(wide.geometry_of_wheel, at[some])
-    seen = wide.turned(places, u[some], lambda place, x, strips: reach(place, x))[:, SEEN]
+    seen = wide.turned(places, u[some], lambda place, x, strips: reach(place, x))[:, SECTION_ROWS]
     return seen[:, :, np.clip(np.arange(u.size), some[0], some[-1]) - some[0]]
 
 

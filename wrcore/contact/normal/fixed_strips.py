@@ -9,7 +9,7 @@ import math
 
 from wrcore.contact.normal.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.normal.newton import solve_linear
-from wrcore.contact.normal.strips import BEND, KEPT, MAX_WINDOWS, STRIPS_FROM, TIPS_FROM, assemble, place_strips
+from wrcore.contact.normal.strips import BEND, KEPT, MAX_WINDOWS, STRIPS_FROM, TIPS_FROM, assemble, lay_out_strips
 from wrcore.contact.normal.windows import active_runs, newborn, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
@@ -22,10 +22,10 @@ _SWEEPS, _AGAIN = 16, 8
 _KEPT = 3
 """Sweeps of which the next one's half lengths are mixed."""
 
-_BESIDE = 0.01
+_ALLOWED_OVERLAP = 0.01
 """Share of the deepest penetration by which loaded surfaces may interpenetrate beside strips that go on."""
 
-_SETTLED, _AT_REST = 0.02, (0.05, 0.002)
+_SETTLED, _CONVERGED = 0.02, (0.05, 0.002)
 """A solution stands if no c would move by more than this share of the largest, and is gone on with until none would by
 the second of two, the first where strips are placed anew."""
 
@@ -50,9 +50,9 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
         for k in range(windows):
             work.start[k + 1] = work.start[k] + FIXED // windows
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
-        place_strips(geometry, pose, frame, work, windows)
+        lay_out_strips(geometry, pose, frame, work, windows)
         _press(work, windows)
-        moved = _carry(values, work, windows, kinds, _SWEEPS, _AT_REST[refined])
+        moved = _carry(values, work, windows, kinds, _SWEEPS, _CONVERGED[refined])
         if moved < 0.0:
             return 0, found, largest, moved
         found, largest = active_runs(work, windows)
@@ -126,17 +126,17 @@ def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
         at, work.start[0] = TIPS_FROM + 3 * k, 0
         work.start[k + 1], work.low[k], work.high[k] = int(memory[at]), memory[at + 1] + shift, memory[at + 2] + shift
     work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
-    place_strips(geometry, pose, frame, work, windows)
+    lay_out_strips(geometry, pose, frame, work, windows)
     for i in range(work.start[windows]):
         at = STRIPS_FROM + 3 * i
         work.active[i] = memory[at] > 0.0
         work.square[i], work.middle[i] = memory[at + 1], memory[at + 2] + memory[1] - frame.x
-    moved = _carry(values, work, windows, kinds, _AGAIN, _AT_REST[1])
+    moved = _carry(values, work, windows, kinds, _AGAIN, _CONVERGED[1])
     if not 0.0 <= moved <= _SETTLED:
         return 0, -1.0
     for i in range(work.start[windows]):
         work.share[i] = work.load[i] / work.square[i]
-    grown = newborn(values, work, windows, stretches, FIXED, _BESIDE) != windows
+    grown = newborn(values, work, windows, stretches, FIXED, _ALLOWED_OVERLAP) != windows
     return 0 if grown else windows, moved
 
 

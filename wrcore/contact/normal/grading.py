@@ -69,7 +69,7 @@ def _measure_at(work, s):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _place_at(work, value):
+def _position_at(work, value):
     """s at which the measure has a value, and its density there."""
     places, measure = work.nodes[S], work.measure
     i = _cell_of(measure, work.looked[0], value)
@@ -87,7 +87,7 @@ def spread(work, k):
     for i in range(first, last):
         part = (i + 1 - first) / (last - first)
         if i + 1 < last:
-            other, density = _place_at(work, begin + part * (end - begin))
+            other, density = _position_at(work, begin + part * (end - begin))
             other_by_low, other_by_high = (1.0 - part) * dense_low / density, part * dense_high / density
         else:
             other, other_by_low, other_by_high = high, 0.0, 1.0

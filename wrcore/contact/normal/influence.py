@@ -76,7 +76,7 @@ def spline_weights(t):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def place_along(xi):
+def cell_along(xi):
     """Cell, part of it, and d tau/d xi / step of the table for |xi|."""
     r = xi - 1.0
     square = r * r + _BLUR * _BLUR
@@ -89,7 +89,7 @@ def place_along(xi):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def place_across(log_eta):
+def cell_across(log_eta):
     """Cell, part of it, and ln eta beyond the table's end."""
     inside = min(max(log_eta, _LOG_START), _LOG_END)
     position = (inside - _LOG_START) * (1.0 / _LOG_STEP)
@@ -101,7 +101,7 @@ def place_across(log_eta):
 def _edge(eta, log_eta, sign):
     """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table,
     where U grows with pi/2 ln eta."""
-    cell, part, beyond = place_across(log_eta)
+    cell, part, beyond = cell_across(log_eta)
     v0, v1, v2, v3, d0, d1, d2, d3 = spline_weights(part)
     factor, over, rest = sign * eta, sign * eta, 0.0
     if beyond > 0.0:
@@ -206,7 +206,7 @@ def influence_of(values, xi, low, high, edges):
     eta, and over eta (the difference of the two slopes); ``edges``: see `edges_of`."""
     if xi * xi + max(low, 0.0) ** 2 > _FAR:
         return _expanded(xi, low, high)
-    cell, part, rate = place_along(xi)
+    cell, part, rate = cell_along(xi)
     near, far = edges
     columns, weights = (near[0], far[0]), spline_weights(part)
     value, along, over_low, over_high = _contract(values, cell, columns, weights, near[1] + far[1], near[2] + far[2])

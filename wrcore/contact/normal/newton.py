@@ -3,7 +3,7 @@
 import math
 
 from wrcore.contact.normal.gap import CREST
-from wrcore.contact.normal.strips import assemble, place_strips
+from wrcore.contact.normal.strips import assemble, lay_out_strips
 from wrcore.kernels.jit import FUSED, jit
 
 
@@ -136,7 +136,7 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
         work.stride[0, k] = work.stride[1, k] = 0.0
     for step in range(most):
         work.left[0] -= 1
-        place_strips(geometry, pose, frame, work, windows)
+        lay_out_strips(geometry, pose, frame, work, windows)
         largest = top_squares(work, windows)
         if kinds == 2:
             for i in range(strips):

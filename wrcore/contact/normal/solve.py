@@ -27,12 +27,12 @@ from wrcore.contact.normal.strips import (
     FIXED,
     GUESSED,
     KEPT,
-    PLACE,
     STRIPS_FROM,
     TIPS_FROM,
     WEIGHT,
+    WHEEL_POSITION,
     WIDENED,
-    place_strips,
+    lay_out_strips,
 )
 from wrcore.contact.normal.windows import (
     count_again,
@@ -122,7 +122,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         windows = int(memory[0])
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
-            place_strips(geometry, pose, frame, work, windows)
+            lay_out_strips(geometry, pose, frame, work, windows)
             if newborn(values, work, windows, stretches, usual, _BORN) == windows:
                 if overlooked(work, windows, stretches) <= _OVERLOOKED:
                     _remember(frame, work, windows, guessed, usual - resolution, memory)
@@ -149,8 +149,8 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
     if work.more[WIDENED] == 1.0:  # not of the second of two solutions
         memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
-        memory[KEPT], (memory[PLACE], memory[PLACE + 1]) = 0.0, _place_of(geometry, pose)
-        memory[PLACE + 2] = math.atan2(frame.sine, frame.cosine)
+        memory[KEPT], (memory[WHEEL_POSITION], memory[WHEEL_POSITION + 1]) = 0.0, _wheel_position(geometry, pose)
+        memory[WHEEL_POSITION + 2] = math.atan2(frame.sine, frame.cosine)
     windows = solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory)
     return _on_overlaps(patches, first, last, work, windows, memory), frame
 
@@ -166,7 +166,7 @@ def _on_overlaps(patches, first, last, work, windows, memory):
 
 
 @jit(allocates=False)
-def _place_of(geometry, pose):
+def _wheel_position(geometry, pose):
     """y, z (m) of the wheel on the rail: where the nominal radius ends below its axle."""
     out, down = geometry.half_distance, geometry.rolling_radius
     return pose.y + out * pose.ey + down * pose.y_down, pose.z + out * pose.ez + down * pose.z_down
@@ -176,9 +176,9 @@ def _place_of(geometry, pose):
 def _near(geometry, pose, frame, memory, reach):
     """Whether the wheel lies within the ``reach`` (m) of where windows were sought in vain, and the frame is the same
     but for little."""
-    y, z = _place_of(geometry, pose)
-    near = memory[0] < 0.0 and abs(y - memory[PLACE]) < reach and abs(z - memory[PLACE + 1]) < reach
-    turned = abs(math.atan2(frame.sine, frame.cosine) - memory[PLACE + 2])
+    y, z = _wheel_position(geometry, pose)
+    near = memory[0] < 0.0 and abs(y - memory[WHEEL_POSITION]) < reach and abs(z - memory[WHEEL_POSITION + 1]) < reach
+    turned = abs(math.atan2(frame.sine, frame.cosine) - memory[WHEEL_POSITION + 2])
     return near and turned < _TURNED and max(abs(frame.ur - memory[2]), abs(frame.z - memory[3])) < _SHIFTED
 
 
@@ -208,7 +208,7 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
         elif status != CONVERGED:
             windows = drop_starved(work, windows, resolution)
         else:
-            place_strips(geometry, pose, frame, work, windows)
+            lay_out_strips(geometry, pose, frame, work, windows)
             more = newborn(values, work, windows, stretches, resolution, born)
             if more == windows and overlooked(work, windows, stretches) > _OVERLOOKED:
                 more = work.left[0] = -1

@@ -56,8 +56,8 @@ in place of the strips more, and the load in place of Q."""
 TIPS_FROM = 4
 GUESSED = TIPS_FROM + 3 * MAX_WINDOWS
 EXTRA = KEPT = GUESSED + 1
-PLACE = EXTRA + 1
-STRIPS_FROM = PLACE + 3
+WHEEL_POSITION = EXTRA + 1
+STRIPS_FROM = WHEEL_POSITION + 3
 """Where a memory holds what."""
 
 
@@ -146,7 +146,7 @@ def normal_work():
 
 
 @jit(allocates=False, fastmath=FUSED)
-def place_strips(geometry, pose, frame, work, windows):
+def lay_out_strips(geometry, pose, frame, work, windows):
     """Centres, widths and gaps of the strips between the windows' tips."""
     u, ur = work.gap[0, U], work.gap[0, UR]
     for k in range(windows):

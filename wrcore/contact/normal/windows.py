@@ -17,7 +17,7 @@ from wrcore.contact.normal.strips import (
     WEIGHT,
     WIDENED,
     gap_under_load,
-    place_strips,
+    lay_out_strips,
 )
 from wrcore.contact.search.reduction import CURVATURE_X, CURVATURE_Y
 from wrcore.kernels.jit import FUSED, jit
@@ -28,7 +28,7 @@ FEWEST_STRIPS, SLENDER_WINDOW = 8, 4.0
 _USUAL = 16
 """Strips of wide windows beyond which slender ones have more, too: where rails have sharp edges."""
 
-MORE = 1.05
+BLENDING_RATIO = 1.05
 """Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
 
 _STEPS = (1.0 / SLENDER_WINDOW, 1.2, 1.8)
@@ -103,7 +103,7 @@ def count_strips(width, length, resolution, more):
     rises from 0 to 1, so that forces do not step. It is the largest over the windows."""
     ratio = more[WIDENED] * width / length
     for step in _STEPS:
-        t = (MORE * ratio / step - 1.0) / (MORE - 1.0)
+        t = (BLENDING_RATIO * ratio / step - 1.0) / (BLENDING_RATIO - 1.0)
         if 0.0 < t <= 1.0 and more[WIDENED] == 1.0 and (step >= 1.0 or resolution != FEWEST_STRIPS):
             more[WEIGHT] = max(more[WEIGHT], t * t * (3.0 - 2.0 * t))
     if ratio < _STEPS[0]:
@@ -165,7 +165,7 @@ def start_strips(geometry, pose, frame, work, windows, stretches):
     """Strips of the windows with the guess of c (never nothing) and of Q."""
     count = work.ends[stretches - 1]
     work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
-    place_strips(geometry, pose, frame, work, windows)
+    lay_out_strips(geometry, pose, frame, work, windows)
     for k in range(windows):
         largest = 0.0
         first, last = work.start[k], work.start[k + 1]

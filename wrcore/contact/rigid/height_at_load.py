@@ -18,7 +18,7 @@ ROLL_RANGE = 0.05
 
 
 @jit(allocates=False)
-def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
+def static_wheel_force(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
     """Number of patches of one wheel (``side`` +1 left, -1 right) in a pose of the wheelset (m, rad) and the vertical
     force on it (N), at rest; fills ``patches`` (MAX_PATCHES, PATCH_COLUMNS), semi-axes and normal forces with them.
 
@@ -70,7 +70,10 @@ def _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, redu
         middle = 0.5 * (low + high)
         if middle == low or middle == high:
             break
-        if wheel_at_rest(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, reduction, patches)[1] > load:
+        if (
+            static_wheel_force(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, reduction, patches)[1]
+            > load
+        ):
             low = middle
         else:
             high = middle
@@ -82,9 +85,9 @@ def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
     """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
     within ``Z_RANGE`` of ``nominal`` does."""
     low, high = nominal - Z_RANGE, nominal + Z_RANGE
-    if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
+    if static_wheel_force(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
         return np.nan
-    if wheel_at_rest(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, reduction, patches)[1] > load:
+    if static_wheel_force(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, reduction, patches)[1] > load:
         return np.nan
     return _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, low, high, patches)
 
@@ -97,7 +100,7 @@ def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reductio
     low = high = np.nan
     excess_low = excess_high = 0.0
     for k in range(90):
-        force = wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1]
+        force = static_wheel_force(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1]
         excess = force ** (2.0 / 3.0) - goal
         if abs(excess) <= CLOSE * goal:
             return z
@@ -133,7 +136,9 @@ def _branch_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
     low = high = np.nan  # the wheel carries more at ``low``, less at ``high``
     for k in range(2 * int(BRANCH_REACH / BRANCH_STEP + 0.5) + 2):
         z = start + k * step
-        pressed = wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1] > load
+        pressed = (
+            static_wheel_force(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1] > load
+        )
         if pressed:
             low = z
         else:

@@ -57,7 +57,7 @@ from wrcore.contact.search.scan import (
     rail_cell,
     scan,
     strip_gap,
-    strip_place,
+    strip_position,
 )
 from wrcore.contact.search.strip import changes_along, gap_at, make_pose, strip_point
 from wrcore.errors import InputError, one_of
@@ -283,7 +283,7 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
         m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3
     else:
         middle = (overlap.first + overlap.last) // 2
-        ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_place(grid, wheel, begin + middle)[0]
+        ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_position(grid, wheel, begin + middle)[0]
         shift = fine_cell_shift(geometry, start + middle * SCAN_STEP, ur)
         m0, m1, m2, start, nodes = fine_sums(geometry, pose, shift, outside, beyond)
         if nodes < WIDE:

@@ -35,7 +35,7 @@ from wrcore.contact.search.scan import (
     leaves_cells,
     make_window,
     spread_grid,
-    strip_place,
+    strip_position,
 )
 from wrcore.contact.search.strip import cubic_at, make_pose, strip_point
 from wrcore.kernels import lanes
@@ -134,7 +134,7 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _at_node(nodes, wheel, rail, k):
     """Gap at a node, its height, its distance from the start of the rail's cell below, and the rail's slope there."""
-    d, height = strip_place(nodes.grid, wheel, k)
+    d, height = strip_position(nodes.grid, wheel, k)
     cell = np.uint64(nodes.grid.cell + k)
     c1, c2, c3 = rail[1, cell], rail[2, cell], rail[3, cell]
     return height - (rail[0, cell] + d * (c1 + d * (c2 + d * c3))), height, d, c1 + d * (2.0 * c2 + d * (3.0 * c3))

@@ -161,7 +161,7 @@ def first_zone(near, block):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def strip_place(grid, wheel, k):
+def strip_position(grid, wheel, k):
     """Distance of the k-th strip from the start of its rail cell, and its height."""
     square, node = grid.tilt_square, np.uint64(grid.node + k)
     down = square * (wheel[DOWN_4, node] + square * wheel[DOWN_6, node])
@@ -174,7 +174,7 @@ def strip_place(grid, wheel, k):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_gap(grid, wheel, rail, k):
     """Gap of the k-th strip."""
-    d, height = strip_place(grid, wheel, k)
+    d, height = strip_position(grid, wheel, k)
     cell = np.uint64(grid.cell + k)
     return height - (rail[0, cell] + d * (rail[1, cell] + d * (rail[2, cell] + d * rail[3, cell])))
 
@@ -239,7 +239,7 @@ def deepest_strip(grid, wheel, rail, first, last):
         depth = -1.0 * gaps_of_eight(grid, wheel, rail, k) * lanes.load8(rail, RAIL_COSINE, np.uint64(k))
         chosen = lanes.where_below(best, depth, float(k) + lanes.ramp8(), chosen)
         best = lanes.where_below(best, depth, depth, best)
-    shallower = lanes.below(best, lanes.lanes8(lanes.greatest(best)))
+    shallower = lanes.below(best, lanes.lanes8(lanes.maximum(best)))
     return int(lanes.lane(chosen, lanes.lowest_bit(~shallower)))
 
 
@@ -250,7 +250,7 @@ def fine_cell_shift(geometry, u, ur):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _own_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, last):
+def _profile_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, last):
     """`Grid` of strips ``step`` apart from the profile's first node on, where they lie between ``first`` and ``last``
     on the wheel (m); where the first one lies, its number, and that after the last one. ``shift``: number of the rail
     cell below a strip less the strip's."""
@@ -265,9 +265,10 @@ def _own_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, last)
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_grid(geometry, pose, shift, first, last):
-    """`_own_grid` of the strips at all of the profile's nodes. ``shift``: see `fine_cell_shift`, for the middle of an
+    """`_profile_grid` of the strips at all of the profile's nodes. ``shift``: see `fine_cell_shift`, for the middle of
+    an
     overlap."""
-    return _own_grid(
+    return _profile_grid(
         geometry, pose, geometry.fine_wheel, geometry.fine_rail, geometry.rail_start, geometry.wheel_step, shift, first,
         last,
     )  # fmt: skip
@@ -278,7 +279,7 @@ def spread_grid(geometry, pose, shift, first, last):
     """The same at its spread nodes, and the rail's cells below them."""
     part, step = shift % SPREAD, geometry.wheel_step
     rail, start = geometry.spread_rail[part], geometry.rail_start + part * step
-    own = _own_grid(
+    own = _profile_grid(
         geometry, pose, geometry.spread_wheel, rail, start, SPREAD * step, (shift - part) // SPREAD, first, last
     )
     return own, start, rail
@@ -323,4 +324,4 @@ def planar_bound(grid, yaw_square, wheel, rail, begin, end):
         limit = missed + 2.0 * (lanes.load8(wheel, WHEEL_RESERVE, node) + reserve)
         counted = lanes.where_below(gap, limit, missed * lanes.load8(wheel, WHEEL_COSINE, node), lanes.lanes8(0.0))
         largest = lanes.where_below(largest, counted, counted, largest)
-    return lanes.greatest(largest)
+    return lanes.maximum(largest)

@@ -25,7 +25,7 @@ def wrapped(function, note):
     alone = not isinstance(returned, BaseTuple)
 
     def of_force(elements, k, stretch, speed, state, rate, at):
-        states, parameters, rates = own_arrays(elements, k, state, rate, at)
+        states, parameters, rates = law_arrays(elements, k, state, rate, at)
         given = total(states)
         force = float(function(stretch, speed, states, parameters, rates))
         if total(states) != given:  # the law wrote to what it may only read
@@ -34,7 +34,7 @@ def wrapped(function, note):
         return force, 0.0, 0.0, force * speed
 
     def of_three(elements, k, stretch, speed, state, rate, at):
-        states, parameters, rates = own_arrays(elements, k, state, rate, at)
+        states, parameters, rates = law_arrays(elements, k, state, rate, at)
         given = total(states)
         force, stored, lost = function(stretch, speed, states, parameters, rates)
         force = float(force)
@@ -43,7 +43,7 @@ def wrapped(function, note):
         note(stretch + speed + given, force + total(rates))
         return force, 0.0, float(stored), float(lost)
 
-    def own_arrays(elements, k, state, rate, at):
+    def law_arrays(elements, k, state, rate, at):
         row, end = elements.law[k], at + int(elements.directed[k, law.NUMBERS])
         return state[at:end], elements.parameters[row[law.FIRST] : row[law.LAST]], rate[at:end]
 
@@ -53,7 +53,7 @@ def wrapped(function, note):
             found += number
         return found
 
-    own_arrays, total = map(own.uncached, (own_arrays, total))
+    law_arrays, total = map(own.uncached, (law_arrays, total))
     return of_force if alone else of_three
 
 

@@ -31,7 +31,7 @@ _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field si
 _SIDES = 12e-3, 8e-3  # m below a rail's top: its sides, and the least depth that shows them
 _OPEN = 4e-3  # m; half a head falls less than this at its open end
 _STEEP = 0.7  # slope; sides of rails and flanges of wheels are steeper, a circle of 300 mm reaches it at 172 mm
-_BESIDE, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
+_SIDE_MARGIN, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
 _OUTWARD = (
     1.0 / 55.0
 )  # rails lean towards the track's centre by 1/20 to 1/40 or stand upright; worn ones seem to lean less
@@ -150,7 +150,7 @@ def check_rail(u, f, name, mends):
             raise InputError(name, "points", f"{expected}, {got}: {mends.u}, or the opposite where that is so")
 
 
-def check_beside(u, f, name):
+def check_sides(u, f, name):
     """Refuse points of a rail that lie beside its head, where neither its sides nor its foot are. A curve that is
     nowhere steep has no sides: rails of roller rigs and of tests are circles."""
     top = int(np.argmax(f))
@@ -160,8 +160,9 @@ def check_beside(u, f, name):
     sides = [_side(u, f, top, step, _SIDES[0]) for step in (-1, 1)]
     near = (f < f[top] - _SIDES[0]) & (f > f[top] - _DEEP)
     for edge, sign in zip(sides, (-1.0, 1.0), strict=True):
-        if edge is not None and np.any(near & (sign * (u - edge) > _BESIDE)):
-            expected = f"expected a rail whose sides fall, got points more than {1e3 * _BESIDE:g} mm beside its head"
+        if edge is not None and np.any(near & (sign * (u - edge) > _SIDE_MARGIN)):
+            wide = f"{1e3 * _SIDE_MARGIN:g} mm"
+            expected = f"expected a rail whose sides fall, got points more than {wide} beside its head"
             raise InputError(name, "points", f"{expected}, as of another head or a wheel: leave them out (within)")
 
 

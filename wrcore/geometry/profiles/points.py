@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.geometry.profiles.checks import Mends, check_beside, check_extent, check_rail, check_wheel
+from wrcore.geometry.profiles.checks import Mends, check_extent, check_rail, check_sides, check_wheel
 from wrcore.geometry.profiles.smoothing import even_out
 from wrcore.kernels.cache import warn
 
@@ -160,7 +160,7 @@ def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0
             check_rail(u[kept], f[kept], name, mends)
         head = _head(u[kept], f[kept], lines[kept], name)
         if mends:
-            check_beside(u[kept], f[kept], name)
+            check_sides(u[kept], f[kept], name)
         kept = kept[head]
     if trim:
         kept = kept[_forward(u[kept], f[kept])]

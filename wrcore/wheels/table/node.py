@@ -8,7 +8,7 @@ from wrcore.contact.hertz import contact_modulus
 from wrcore.contact.normal import solve
 from wrcore.contact.normal.gap import group_end, material_point, rigid_slip, strip_wrenches
 from wrcore.contact.normal.strips import WEIGHT, WIDENED
-from wrcore.contact.normal.windows import MORE
+from wrcore.contact.normal.windows import BLENDING_RATIO
 from wrcore.contact.patch.model import NUMBERS
 from wrcore.contact.patch.solution import library_of, roll_patch, solve_overlaps
 from wrcore.contact.rigid.height_at_load import bracket_from, narrowed
@@ -228,7 +228,7 @@ def solve_place(contact, handle, works, place, points):
         return None
     (y, z, axle), u, _ = found
     at, axle, sums, each, pressed = (y, z, axle), np.array(axle), np.zeros(SUMS), np.zeros(SUMS), []
-    for work, more in zip(works, (1.0, MORE), strict=True):
+    for work, more in zip(works, (1.0, BLENDING_RATIO), strict=True):
         windows, frame, share = press_lobe(
             handle, *at, u, limits, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
         )

@@ -24,8 +24,8 @@ from wrcore.contact.rolling.rolling import LEVELS as RESOLUTIONS
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
-from wrcore.kernels.told import PATIENCE, handed_on, interrupted, reached_so_far, tell, told_if_long, warn_once
-from wrcore.wheels.contact_model import alone
+from wrcore.kernels.told import PATIENCE, handed_on, interrupted, reached_so_far, say_if_long, tell, warn_once
+from wrcore.wheels.contact_model import without_wheels
 from wrcore.wheels.table.cells import (
     BESIDE,
     FINER,
@@ -117,7 +117,7 @@ class Pair(PairSolver):
     def _told(self):
         mu, begin = self.contact.strips.looked_up, time.monotonic()
         text = f"exact contact at a friction of {mu:g} is solved for its table, once ({self.path}); {WITHOUT}"
-        with told_if_long(text, self._spent):
+        with say_if_long(text, self._spent):
             yield
         self._spent += time.monotonic() - begin
         if self._spent > self._next_told:
@@ -285,7 +285,7 @@ def pair_of(contact):
     with _MAKING:  # threads share one
         pair = _PAIRS.get(name)
         if pair is None:
-            bare = alone(contact, damping=1.0, friction=settings.looked_up)
+            bare = without_wheels(contact, damping=1.0, friction=settings.looked_up)
             pair = _PAIRS[name] = Pair(bare, name)
     return pair
 
