@@ -726,7 +726,7 @@ def test_how_far_solving_has_come_is_told_ever_more_seldom(own_cache, monkeypatc
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
     monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
     monkeypatch.setattr(pair_store, "_PAIRS", {})
-    monkeypatch.setattr(pair_store, "told_if_long", lambda *_: nullcontext())
+    monkeypatch.setattr(pair_store, "say_if_long", lambda *_: nullcontext())
     pair, said = shipped_pair(), []
     for seconds in (0.0, 31.0, 59.0, 61.0, 100.0, 119.0):
         pair._spent = seconds
