@@ -40,11 +40,11 @@ GROUPS = {
 ROOMS = (
     "analysis.stability.modes", "analysis.assessment.ride", "analysis.stability.stability",
     "analysis.stability.limit_cycles", "analysis.to_accuracy", "analysis.contact.poses", "analysis.contact.loaded",
-    "contact.wheel_on_rail", "contact.conicity",
-    "contact.first_touch", "contact.pose_file", "contact.detection", "contact.normal", "creep.cases", "creep.kalker",
-    "creep.laws", "creep.table", "geometry.profile", "geometry.profile_files", "geometry.profile_meters",
-    "geometry.standards", "geometry.irregularity", "geometry.track", "run.channels", "run.validity",
-    "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",
+    "contact.rigid.wheel_on_rail", "contact.rigid.conicity", "contact.rigid.first_touch", "contact.rigid.pose_file",
+    "contact.search.detection", "contact.hertz", "creep.cases", "creep.kalker", "creep.laws", "creep.table",
+    "geometry.profiles.profile", "geometry.profiles.files", "geometry.profiles.meters",
+    "geometry.profiles.standards", "geometry.irregularity", "geometry.track", "run.output.channels",
+    "run.checks.validity", "scene.description", "scene.compile", "sweep.measures", "sweep.plan", "sweep.batch",
 )  # fmt: skip
 """Modules that scripts use beside the public names."""
 

@@ -168,9 +168,9 @@ VEHICLE = ("analysis/assessment/wheels",)
 LOADED = (*CONTACT, *FORCES, "analysis/contact/loaded", "analysis/contact/poses")
 STYLE = ("analysis/pictures/style", "study/style", "study/report/legible")
 CORE = {
-    "creep": sources("kernels", "creep"),
-    "creep_study": sources("kernels", "creep", "study/creep/laws"),
-    "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
+    "creep": sources("kernels", "creep", "contact/rolling"),
+    "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws"),
+    "creep_figures": sources("kernels", "creep", "contact/rolling", "study/creep", *STYLE),
     "geometry": sources(*LOADED, *SCENE, "study/paper/motion", "study/paper/tables"),
     "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),

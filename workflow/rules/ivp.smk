@@ -1,7 +1,7 @@
 # A published benchmark of constrained wheelset dynamics: the Test Set's "Wheelset", solved and priced.
 
 IVP = config["ivp"]
-CORE["ivp"] = sources("kernels", "integrate", "study/ivp/problem", "study/ivp/wheelset", "study/ivp/runs")
+CORE["ivp"] = sources("kernels", "study/ivp/problem", "study/ivp/wheelset", "study/ivp/runs")
 CORE["ivp_figures"] = CORE["ivp"] + sources(*STYLE, "study/ivp/figures")
 
 
