@@ -1,1 +1,1 @@
-"""Rigid bodies, their joints, and the forces that joints need."""
+"""Rigid bodies, joints between them, and the reaction forces of the joints."""

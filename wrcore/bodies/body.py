@@ -3,9 +3,9 @@
 State of one body, 13 numbers: position r (3), Euler parameters p = (e0, e1, e2, e3), velocity v (3) and angular
 velocity w (3), the last two in track axes. The rotation matrix A(p) turns body axes into track axes.
 
-A body of revolution that spins about its own axis (a wheelset) carries a frame that does not spin: its Euler
-parameters follow w - (w . e) e with e the axle's direction. Nothing in the model can tell the angle of spin (inertia,
-wheel surfaces and axle boxes have the axle as symmetry axis), and the parameters stay slow and accurate at any speed.
+A wheelset is a body of revolution that spins about its axle. Its frame does not spin: the Euler parameters follow
+w - (w . e) e, with e the axle's direction. No force of the model depends on the angle of spin, because inertia, wheel
+surfaces and axle boxes have the axle as symmetry axis. The parameters change slowly and stay accurate at any speed.
 
 References
 ----------
@@ -23,8 +23,9 @@ POSITION, EULER, VELOCITY, OMEGA = 0, 3, 7, 10
 
 
 def euler_parameters(roll, pitch, yaw):
-    """Euler parameters of the rotations Rz(yaw) Rx(roll) Ry(pitch), angles that broadcast: shape (..., 4). Pitch comes
-    first, about the body's own lateral axis, so that it is the spin of a wheelset."""
+    """Return Euler parameters, shape (..., 4), of the rotations Rz(yaw) Rx(roll) Ry(pitch); the angles (rad) broadcast.
+
+    The pitch rotation is applied first, about the body's lateral axis, so that it is the spin of a wheelset."""
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(0.5 * angle), np.sin(0.5 * angle)) for angle in (roll, pitch, yaw))
     # quaternion product (cy, 0, 0, sy) (cr, sr, 0, 0) (cp, 0, sp, 0)
     e0, e1, e2, e3 = cy * cr, cy * sr, sy * sr, sy * cr
@@ -32,7 +33,7 @@ def euler_parameters(roll, pitch, yaw):
 
 
 def euler_of(matrix):
-    """Euler parameters of a rotation matrix (3, 3), shape (4,), with e0 >= 0."""
+    """Return the Euler parameters (4,), with e0 >= 0, of a rotation matrix (3, 3)."""
     (a, b, c), (d, e, f), (g, h, i) = np.asarray(matrix, float)
     squares = np.array([1.0 + a + e + i, 1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i])  # 4 e_k^2
     k = int(np.argmax(squares))
@@ -45,14 +46,14 @@ def euler_of(matrix):
 
 
 def matrix_of(p):
-    """Rotation matrix (3, 3) of Euler parameters (4,)."""
+    """Return the rotation matrix (3, 3) of Euler parameters (4,)."""
     matrix = np.empty((3, 3))
     rotation_matrix(np.concatenate([np.zeros(3), p]), 0, matrix)
     return matrix
 
 
 def angles(p):
-    """Roll, pitch and yaw (rad) of Euler parameters (..., 4), the inverse of :func:`euler_parameters`."""
+    """Return roll, pitch and yaw (rad) of Euler parameters (..., 4), the inverse of :func:`euler_parameters`."""
     e0, e1, e2, e3 = np.moveaxis(np.asarray(p, float), -1, 0)
     norm = e0**2 + e1**2 + e2**2 + e3**2
     roll = np.arcsin(np.clip(2.0 * (e2 * e3 + e0 * e1) / norm, -1.0, 1.0))
@@ -63,7 +64,9 @@ def angles(p):
 
 @jit(allocates=False, fastmath=FUSED)
 def rotation_matrix(state, at, matrix):
-    """Write A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3): a rotation, however long p is."""
+    """Write the rotation matrix A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3).
+
+    The matrix is orthogonal for any norm of p."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
     two = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
     matrix[0, 0] = 1.0 - two * (e2 * e2 + e3 * e3)
@@ -79,9 +82,10 @@ def rotation_matrix(state, at, matrix):
 
 @jit(allocates=False, fastmath=FUSED)
 def euler_rates(state, at, wx, wy, wz, alpha, rate):
-    """Rates of the Euler parameters for an angular velocity in track axes, p' = 1/2 E(p)^T w. The norm p . p = 1 is an
-    invariant of this equation; the term alpha (1 - p . p) p takes away what the integrator adds to it (Baumgarte's
-    feedback for a first-order equation)."""
+    """Write the rates of the Euler parameters, p' = 1/2 E(p)^T w with w in track axes, into ``rate``.
+
+    The norm p . p = 1 is an invariant of this equation. The term alpha (1 - p . p) p removes the error that the
+    integrator adds to the norm (Baumgarte's feedback for a first-order equation)."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
     correction = alpha * (1.0 - e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3)
     rate[at + 3] = 0.5 * (-e1 * wx - e2 * wy - e3 * wz) + correction * e0

@@ -1,19 +1,19 @@
 """Moments and products of inertia: principal axes of bodies, and parts of wheelsets that do not turn with the axle.
 
-Kernels know principal moments d and principal axes M, so that the inertia in track axes is J = M diag(d) M^T. Where the
-axes of all bodies are principal, M are the bodies' own rotations and nothing here runs but what always did.
+Kernels use principal moments d and principal axes M: the inertia in track axes is J = M diag(d) M^T. If the axes of all
+bodies are principal axes, M are the rotation matrices of the bodies and no extra computation is needed.
 
-*Wheelsets* whose roll and yaw moments differ, or that have a product xz, carry parts that do not turn with the axle:
-bearings, a gear box, an axle-hung motor. Wheels and axle are a body of revolution with angular velocity w; what they
-carry follows w - s e, s = w . e, about the axle's direction e. What holds those parts in pitch (a reaction rod) takes
-up all moments about e that they need, so that their own pitch moment does not count. With the pitch moment d_2 and the
+A *wheelset* whose roll and yaw moments differ, or that has a product xz, carries parts that do not turn with the axle:
+bearings, a gear box, an axle-hung motor. Wheels and axle are a body of revolution with angular velocity w. The carried
+parts have the angular velocity w - s e, s = w . e, with e the axle's direction. Their support in pitch (a reaction rod)
+takes up all their moments about e, so that their pitch inertia has no effect. With the pitch moment d_2 and the
 inertia D across the axle, carried parts included, the moments about the centre are
 
     J w' + s (d_2 - D)(w x e),   J = d_2 e e^T + D,
 
-which for D = d_1 (1 - e e^T), a body of revolution, is J w' + w x J w. D is given in axes that stay level: x across the
-axle and horizontal, whatever the angle of the wheelset's own frame about the axle, which nothing else can tell. The
-turn of these axes about e, (yaw rate) x (roll), is left out; what it would do is of third order.
+which for D = d_1 (1 - e e^T), a body of revolution, is J w' + w x J w. D is given in level axes: x is horizontal and
+perpendicular to the axle, whatever the angle of the wheelset's frame about the axle. The rotation rate of these axes
+about e, (yaw rate) x (roll), is neglected; its effect is of third order.
 
 References
 ----------
@@ -30,8 +30,10 @@ from wrcore.kernels.jit import FUSED, jit
 
 
 def tensor_of(inertia):
-    """Inertia tensor (3, 3), kg m^2, of a dict of moments ``roll``, ``pitch``, ``yaw`` and products of inertia ``xy``,
-    ``xz``, ``yz``, integrals over the mass such as that of x y, which stand in the tensor with a minus."""
+    """Return the inertia tensor (3, 3), kg m^2, from a dict of moments and products of inertia.
+
+    The keys are the moments ``roll``, ``pitch``, ``yaw`` and the products ``xy``, ``xz``, ``yz``. A product is the
+    integral over the mass, for example of x y; the tensor holds its negative."""
     tensor = np.diag([float(inertia[key]) for key in ("roll", "pitch", "yaw")])
     for key, place in (("xy", (0, 1)), ("xz", (0, 2)), ("yz", (1, 2))):
         if inertia.get(key):
@@ -40,8 +42,10 @@ def tensor_of(inertia):
 
 
 def principal(tensors, spins):
-    """Principal moments (n, 3) and axes (n, 3, 3) of inertia tensors (n, 3, 3) in the bodies' axes; no axes, (0, 3, 3),
-    where none are needed. The second one of a wheelset (``spins``) stays its axle."""
+    """Return principal moments (n, 3) and principal axes (n, 3, 3) of inertia tensors (n, 3, 3) in the bodies' axes.
+
+    The axes have shape (0, 3, 3) if the axes of all bodies are principal and no wheelset carries parts that do not turn
+    with the axle. The second principal axis of a wheelset (``spins``) is its axle."""
     tensors = np.asarray(tensors, float).reshape(-1, 3, 3)
     moments = np.diagonal(tensors, axis1=1, axis2=2).copy()
     axes = np.tile(np.eye(3), (len(tensors), 1, 1))
@@ -54,20 +58,20 @@ def principal(tensors, spins):
 
 
 def inertia_tensors(bodies):
-    """Inertia tensors in the bodies' own axes, (n, 3, 3), kg m^2."""
+    """Return the inertia tensors of all bodies in body axes, (n, 3, 3), kg m^2."""
     axes = bodies.axes if len(bodies.axes) else np.tile(np.eye(3), (len(bodies.mass), 1, 1))
     return (axes * bodies.inertia[:, None, :]) @ axes.transpose(0, 2, 1)
 
 
 @jit(inline="always")
 def inertia_axes(bodies, work):
-    """Principal axes of all bodies in track axes, (n, 3, 3), of the last evaluation."""
+    """Return the principal axes of all bodies in track axes, (n, 3, 3), from the last evaluation."""
     return work.principal if bodies.axes.shape[0] > 0 else work.rotations
 
 
 @jit(allocates=False, fastmath=FUSED)
 def turn_to_principal(bodies, rotations, out):
-    """Write the principal axes of all bodies into ``out`` (n, 3, 3), from their rotations and ``Bodies.axes``."""
+    """Write the principal axes of all bodies in track axes into ``out`` (n, 3, 3), from ``rotations`` and `Bodies`."""
     for b in range(bodies.axes.shape[0]):
         axes = rotations[b]
         ex, ey, ez = axes[0, 1], axes[1, 1], axes[2, 1]
@@ -87,7 +91,9 @@ def turn_to_principal(bodies, rotations, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def apply_inverse_inertia(inertia, axes, wrench, out):
-    """out = J^-1 n for the moment part of a wrench (6,), J = M diag(inertia) M^T with the columns M of ``axes``."""
+    """Write J^-1 n into ``out`` (3,), with n the moment part of a wrench (6,) and J = M diag(inertia) M^T.
+
+    The columns of M are the principal axes in ``axes``."""
     for i in range(3):
         out[i] = 0.0
     for k in range(3):
@@ -99,7 +105,7 @@ def apply_inverse_inertia(inertia, axes, wrench, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def subtract_gyroscopic(inertia, axes, state, at, wrench):
-    """Subtract w x J w from the moment part of a wrench (6,)."""
+    """Subtract the gyroscopic moment w x J w of a body from the moment part of its wrench (6,)."""
     wx, wy, wz = load(state, at + OMEGA)
     hx = hy = hz = 0.0
     for k in range(3):
@@ -114,13 +120,13 @@ def subtract_gyroscopic(inertia, axes, state, at, wrench):
 
 @jit(inline="always")
 def carrying(bodies, b):
-    """Whether a body is a wheelset with parts that do not turn with the axle."""
+    """Whether a body is a wheelset that carries parts that do not turn with the axle."""
     return bodies.spins[b] == 1 and bodies.inertia[b, 0] != bodies.inertia[b, 2]
 
 
 @jit(allocates=False, fastmath=FUSED)
 def add_carried_gyroscopic(inertia, axes, state, at, factor, wrench):
-    """Add ``factor`` times s (d_2 - D)(w x e) to the moment part of a wrench (6,), of a wheelset that carries parts."""
+    """Add ``factor`` times the moment s (d_2 - D)(w x e) to the wrench (6,) of a wheelset with carried parts."""
     w, e = load(state, at + OMEGA), (axes[0, 1], axes[1, 1], axes[2, 1])
     spin, turned = dot(w, e), cross(w, e)
     for k in range(0, 3, 2):

@@ -1,29 +1,29 @@
 """Joints as constraint equations Phi(q, t) = 0 with their Jacobian D and right-hand side gamma of Eq. (8).
 
-Velocities are v = (r', w) per body in track axes, so that the velocity constraint reads Phi' = D v + dPhi/dt and the
-acceleration constraint D v' = gamma. A joint holds a marker of body i, at the arm s_i from its centre, to a marker of
-body j. With
+Velocities are v = (r', w) per body in track axes. The velocity constraint is Phi' = D v + dPhi/dt, the acceleration
+constraint is D v' = gamma. A joint connects a marker of body i, at the arm s_i from its centre, to one of body j. With
 
     d = r_i + s_i - r_j - s_j,   d' = r_i' + w_i x s_i - r_j' - w_j x s_j,
     d'' = r_i'' + w_i' x s_i - r_j'' - w_j' x s_j + c,   c = w_i x (w_i x s_i) - w_j x (w_j x s_j)
 
 the blocks of D for the two bodies are D_i = [S, R_i] and D_j = -[S, R_j] in every joint below:
 
-*coordinate*: body j is the moving frame, coordinate k of the marker follows it, e.g. a speed kept constant.
+*coordinate*: coordinate k of the marker follows the moving frame, which is body j; for example a constant speed.
     Phi = e_k . d.  S = e_k^T, R = (s x e_k)^T, since e_k . (w x s) = w . (s x e_k).  gamma = -e_k . c.
 *spherical*: the markers coincide.
     Phi = d.  S = I, R = -s~ (s~ x = s x x).  gamma = -c.
-*revolute*: as spherical, and the bodies share an axis e, column k of body i's rotation matrix; a, b are the other two
-    columns of body j's.  Phi_4 = e . a, Phi_4' = (w_i x e) . a + e . (w_j x a) = (w_i - w_j) . n with n = e x a.
+*revolute*: the equations of *spherical*, and the bodies share an axis e, column k of the rotation matrix of body i;
+    a, b are the other two columns of body j.
+    Phi_4 = e . a, Phi_4' = (w_i x e) . a + e . (w_j x a) = (w_i - w_j) . n with n = e x a.
     S = 0, R_i = R_j = n^T.  gamma_4 = -(w_i - w_j) . n'; with n' = (w_i x e) x a + e x (w_j x a) and W = w_i - w_j
-    gamma_4 = -(W . e)(w_i . a) + (W . a)(w_j . e) + (W . W) Phi_4.  Phi_5 the same with b.
-*no_turn*: the bodies do not turn against each other about axis k: the equation above for e, column k + 1 of body i, and
-    a, column k + 2 of body j, alone.  S = 0. With a revolute joint about k it welds both bodies together.
+    gamma_4 = -(W . e)(w_i . a) + (W . a)(w_j . e) + (W . W) Phi_4.  Phi_5 is this equation with b.
+*no_turn*: the bodies do not rotate relative to each other about axis k: only the equation above, with e column k + 1
+    of body i and a column k + 2 of body j.  S = 0. Together with a revolute joint about k it joins the bodies rigidly.
 *rigid_link*: a rod without mass keeps the markers at the distance L; lambda is its tension.
     Phi = |d| - L, u = d / |d|.  S = u^T, R = (s x u)^T.  gamma = -u . c - (d' . d' - (u . d')^2) / |d|.
 
-A wheelset's frame does not spin with it. Its y axis turns with w all the same, e' = w x e, so a joint may use that axis
-and markers on it, but no other direction of a wheelset: it is body i of a revolute joint about y.
+A wheelset's frame does not spin with the wheelset. Only its y axis, the axle, rotates with w, e' = w x e. A joint may
+therefore use this axis and markers on it, but no other direction. A wheelset is body i of a revolute joint about y.
 """
 
 import math
@@ -47,47 +47,49 @@ EQUATIONS = {"coordinate": 1, "spherical": 3, "revolute": 5, "rigid_link": 1, "n
 MOST_EQUATIONS = 5
 
 ON_AXLE = 1e-9
-"""How far from the axle a marker of a wheelset may lie, m."""
+"""Largest distance of a wheelset's marker from the axle, m."""
 
 SHORTEST_LINK = 1e-3
-"""m; a rigid link of no length has no direction."""
+"""Smallest length of a rigid link, m; a link without length has no direction."""
 
 
 class Joint(NamedTuple):
-    """One joint as a vehicle describes it."""
+    """Description of one joint, before it is checked and ordered by `build_joints`."""
 
     name: str
     kind: str
-    """A key of KINDS."""
+    """Kind of the joint, a key of KINDS."""
     bodies: tuple
-    """Two body numbers; FRAME for the moving frame."""
+    """Numbers of the two bodies; FRAME stands for the moving frame."""
     markers: np.ndarray
-    """(2, 3): the joint's point in the axes of each body, m; for the frame, from its origin."""
+    """Point of the joint in the axes of each body, (2, 3), m; for the moving frame relative to its origin."""
     axis: int = 0
-    """coordinate: track axis. revolute and no_turn: axis of both bodies, whose axes are parallel in nominal position.
-    0, 1, 2."""
+    """Axis 0, 1 or 2. For coordinate a track axis; for revolute and no_turn an axis of both bodies, whose axes are
+    parallel in nominal position."""
     length: float = 0.0
-    """Of a rigid link, m."""
+    """Length of a rigid link, m."""
 
 
 class Joints(NamedTuple):
-    """Joints of a model in the order of the solver, for kernels."""
+    """All joints of a model as arrays for kernels, in the order of the solver."""
 
     kind: np.ndarray  # (n,) int
     bodies: np.ndarray
-    """(n, 2) int: first and second body; FRAME can only be the second, a wheelset in a revolute joint the first."""
+    """(n, 2) int: first and second body. FRAME can only be the second; a wheelset in a revolute joint is the first."""
     markers: np.ndarray  # (n, 2, 3): marker positions in body axes, m
     axis: np.ndarray  # (n,) int
     length: np.ndarray  # (n,), m
-    size: np.ndarray  # (n,) int: equations of each joint
-    listed: np.ndarray  # (n,) int: place of each joint in the list that :func:`build_joints` was given
-    equations: int  # number of constraint equations in all
+    size: np.ndarray  # (n,) int: number of equations of each joint
+    listed: np.ndarray  # (n,) int: index of each joint in the list passed to :func:`build_joints`
+    equations: int  # total number of constraint equations
     order: JointOrder
 
 
 def build_joints(items, spins, source="joints"):
-    """Check joints and prepare everything that the solver can know in advance; ``spins`` (bodies,) is 1 for wheelsets,
-    whose frames do not spin with them. An InputError names ``source`` and the joint."""
+    """Check joints and return them as `Joints`, with the structure of the solver's matrix.
+
+    ``spins`` (bodies,) is 1 for wheelsets, whose frames do not spin with them. An InputError names ``source`` and the
+    joint."""
     items = [_checked(item, spins, f"joints.{item.name}", source) for item in items]
     size = np.array([EQUATIONS[item.kind] for item in items], np.int64)
     order, listed = order_joints([item.bodies for item in items], size)
@@ -103,7 +105,7 @@ def build_joints(items, spins, source="joints"):
 
 
 def _checked(item, spins, field, source):
-    """The joint with its bodies in the order that kernels expect."""
+    """Check one joint and return it with its bodies in the order that kernels expect."""
     item = item._replace(bodies=tuple(int(body) for body in item.bodies))
     if item.bodies[0] == item.bodies[1]:
         raise InputError(source, f"{field}.bodies", "expected two different bodies")
@@ -128,17 +130,17 @@ def _checked(item, spins, field, source):
 
 
 class JointState(NamedTuple):
-    """All joints at one state, for kernels. Rows beyond a joint's own equations stay zero."""
+    """Constraint values and Jacobian blocks of all joints at one state. Rows beyond a joint's equations are zero."""
 
-    phi: np.ndarray  # (n, 5): Phi, m or rad
-    rate: np.ndarray  # (n, 5): Phi'
+    phi: np.ndarray  # (n, 5): constraint Phi, m or rad
+    rate: np.ndarray  # (n, 5): its rate Phi', m/s or rad/s
     gamma: np.ndarray  # (n, 5): right-hand side of D v' = gamma
-    along: np.ndarray  # (n, 5, 3): S
-    about: np.ndarray  # (n, 2, 5, 3): R of the first and the second body
+    along: np.ndarray  # (n, 5, 3): block S of D, for the velocities of both bodies
+    about: np.ndarray  # (n, 2, 5, 3): blocks R of D, for the angular velocities of the first and the second body
 
 
 def joint_state(joints):
-    """Allocate a JointState; what no motion changes is filled in."""
+    """Allocate a `JointState` and fill the rows of S that are constant."""
     n = len(joints.kind)
     along = np.zeros((n, MOST_EQUATIONS, 3))
     for k in range(n):
@@ -151,8 +153,9 @@ def joint_state(joints):
 
 
 def joint_jacobian(joints, values, bodies):
-    """The matrix D (equations, bodies, 6) of all joints, rows joint by joint, from `evaluate_joints`, for reading and
-    checking; the solver does without it."""
+    """Return the constraint Jacobian D (equations, bodies, 6) of all joints, from the result of `evaluate_joints`.
+
+    The rows are in the order of the joints. Linearisation and tests use this matrix; the solver does not form it."""
     blocks = []
     for k, size in enumerate(joints.size):
         block = np.zeros((size, bodies, 6))
@@ -165,7 +168,7 @@ def joint_jacobian(joints, values, bodies):
 
 @jit(allocates=False, forceinline=True)
 def evaluate_joints(joints, t, speed, state, rotations, out):
-    """Fill a JointState with all constraints at a state; ``rotations`` (bodies + 1, 3, 3) end with the unit matrix."""
+    """Fill a `JointState` with all constraints at a state; ``rotations`` (bodies + 1, 3, 3) end with the identity."""
     mark = joints.markers
     for k in range(joints.kind.shape[0]):
         kind, i, j = joints.kind[k], joints.bodies[k, 0], joints.bodies[k, 1]
@@ -203,7 +206,7 @@ def evaluate_joints(joints, t, speed, state, rotations, out):
 
 @jit(allocates=False, inline="always")
 def _axis_row(first, second, axis, across, wi, wj, k, row, out):
-    """Equation of a revolute joint: the first body's axis stays perpendicular to the second one's axis ``across``."""
+    """Fill one row: column ``axis`` of the first body stays perpendicular to column ``across`` of the second body."""
     e = (first[0, axis], first[1, axis], first[2, axis])
     a = (second[0, across], second[1, across], second[2, across])
     turn, phi, normal = minus(wi, wj), dot(e, a), cross(e, a)
@@ -215,7 +218,7 @@ def _axis_row(first, second, axis, across, wi, wj, k, row, out):
 
 @jit(allocates=False, inline="always")
 def _point_rows(arm, about):
-    """Rows -s~ of D for the arm s."""
+    """Write the rows -s~ of D for the arm s into ``about``."""
     about[0, 1], about[0, 2] = arm[2], -arm[1]
     about[1, 0], about[1, 2] = -arm[2], arm[0]
     about[2, 0], about[2, 1] = arm[1], -arm[0]
@@ -230,6 +233,6 @@ def _angular_velocity(state, body):
 
 @jit(allocates=False, inline="always")
 def _centripetal(w, arm):
-    """w x (w x s)."""
+    """Return the centripetal acceleration w x (w x s) of a point at the arm s."""
     along, square = dot(w, arm), dot(w, w)
     return w[0] * along - arm[0] * square, w[1] * along - arm[1] * square, w[2] * along - arm[2] * square

@@ -1,18 +1,18 @@
-"""Lagrange multipliers of Eq. (8): the joints' reactions.
+"""Reaction forces of joints: solution of Eq. (8) for the Lagrange multipliers.
 
 The blocks of D for the two bodies of a joint are [S, R_i] and -[S, R_j] (see bodies/joint.py). With M = diag(m, J)
 per body, two joints p and q that hold the same body couple by
 
     +- (S_p S_q^T / m + R_p J^-1 R_q^T),
 
-minus where it is the first body of the one and the second body of the other. These tiles make up D M^-1 D^T. Its
-factors L diag(d) L^T are found cluster by cluster inside the envelope that bodies/joint_order.py describes, so that
-the cost of a chain grows with its length, not with its cube. All tiles of a cluster have the size of its largest joint,
-a constant to the compiler; a joint with fewer equations has ones on the rest of the diagonal.
+with the minus sign if the body is the first one of p and the second one of q, or the reverse. These tiles are the
+blocks of D M^-1 D^T. This matrix is factored as L diag(d) L^T, cluster by cluster, inside the envelope that
+bodies/joint_order.py describes. The cost of a chain is proportional to its length. All tiles of a cluster have the size
+of its largest joint, a constant to the compiler; unused rows of smaller joints have ones on the diagonal.
 
-A redundant equation shows as a pivot d that vanishes against the diagonal entry it started from. Its multiplier is set
-to zero: the accelerations are those of the other equations, which imply the redundant one, and which of the possible
-reactions carries the load is a choice. ``ConstraintWork.redundant`` counts such equations.
+An equation is redundant if its pivot d vanishes relative to the initial diagonal entry. Its multiplier is set to zero.
+The accelerations are still unique, because the other equations imply the redundant one; the distribution of the load
+over the reactions is not. ``ConstraintWork.redundant`` counts such equations.
 """
 
 from typing import NamedTuple
@@ -26,16 +26,16 @@ from wrcore.bodies.vector import cross, dot, load, minus, store
 from wrcore.kernels.jit import FUSED, jit
 
 VANISHED = 1e-10
-"""A pivot below this part of its diagonal entry belongs to a redundant equation. Rounding leaves some 1e-16 of it."""
+"""Ratio of pivot to diagonal entry below which an equation is redundant; rounding leaves about 1e-16."""
 
 
 class ConstraintWork(NamedTuple):
-    """Scratch arrays for n joints; the last row of arrays over bodies belongs to the moving frame and stays zero."""
+    """Work arrays for n joints. In arrays over bodies the last row is for the moving frame and is always zero."""
 
     joints: JointState
     multipliers: np.ndarray
-    """(n, 5): Lagrange multipliers of the last evaluation, N or N m; the first body feels -[S, R]^T lambda."""
-    redundant: np.ndarray  # (1,) int: redundant equations in the last evaluation
+    """(n, 5): Lagrange multipliers of the last evaluation, N or N m; -[S, R]^T lambda acts on the first body."""
+    redundant: np.ndarray  # (1,) int: number of redundant equations in the last evaluation
     inverse_mass: np.ndarray  # (bodies + 1,), 1/kg
     inverse_inertia: np.ndarray  # (bodies + 1, 3, 3): in track axes, 1/(kg m^2)
     accelerations: np.ndarray  # (bodies + 1, 6): without reactions, m/s^2 and rad/s^2
@@ -45,7 +45,7 @@ class ConstraintWork(NamedTuple):
 
 
 def constraint_workspace(joints):
-    """Allocate the scratch arrays for some joints."""
+    """Allocate the work arrays of the solver for these joints."""
     n, bodies = len(joints.kind), int(joints.bodies.max(initial=-1)) + 1
     return ConstraintWork(
         joint_state(joints), np.zeros((n, MOST_EQUATIONS)), np.zeros(1, np.int64),
@@ -57,8 +57,9 @@ def constraint_workspace(joints):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_reactions(model, t, state, work):
-    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches, which hold all other
-    forces; ``work.constraints`` is overwritten."""
+    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to ``work.wrenches``.
+
+    The wrenches must already contain all other forces; ``work.constraints`` is overwritten."""
     joints, scratch = model.joints, work.constraints
     values, accelerations, right = scratch.joints, scratch.accelerations, scratch.multipliers
     evaluate_joints(joints, t, model.speed, state, work.rotations, values)
@@ -79,7 +80,7 @@ def add_reactions(model, t, state, work):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def invert_masses(bodies, joints, axes, scratch):
-    """M^-1 of the bodies that joints hold, from the principal axes of all (n, 3, 3)."""
+    """Fill inverse masses and inverse inertia tensors of the jointed bodies, from the principal ``axes`` (n, 3, 3)."""
     for b in joints.order.moving:
         scratch.inverse_mass[b] = 1.0 / bodies.mass[b]
         a, out = axes[b], scratch.inverse_inertia[b]
@@ -92,7 +93,7 @@ def invert_masses(bodies, joints, axes, scratch):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def apply_inverse_masses(joints, scratch, wrenches):
-    """accelerations = M^-1 wrenches, of the bodies that joints hold."""
+    """Fill the accelerations M^-1 ``wrenches`` of the jointed bodies without reactions."""
     for b in joints.order.moving:
         out, moment = scratch.accelerations[b], load(wrenches[b], 3)
         for i in range(3):
@@ -117,7 +118,7 @@ def solve_multipliers(joints, scratch):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def subtract_reactions(joints, scratch, wrenches):
-    """Subtract D^T lambda from the wrenches."""
+    """Subtract the generalised forces D^T lambda of the joints from the wrenches."""
     values, multipliers = scratch.joints, scratch.multipliers
     for p in range(joints.kind.shape[0]):
         i, j = joints.bodies[p, 0], joints.bodies[p, 1]
@@ -145,7 +146,7 @@ def _solve_cluster(joints, scratch, start, stop, size):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _assemble(joints, scratch, p, size):
-    """Fill one joint's row of tiles of D M^-1 D^T."""
+    """Fill the row of tiles of D M^-1 D^T that belongs to joint p."""
     order, values, base = joints.order, scratch.joints, joints.order.base[p]
     i, j = joints.bodies[p, 0], joints.bodies[p, 1]
     tile, push = scratch.tiles[base + p], scratch.inverse_mass[i] + scratch.inverse_mass[j]
@@ -179,7 +180,7 @@ def _assemble(joints, scratch, p, size):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _diagonal_tile(about, inertia, mobile, other_about, other_inertia, other_mobile, tile, size):
-    """Lower half of R J^-1 R^T, summed over the two bodies of a joint; R J^-1 is kept in ``mobile``."""
+    """Fill the lower half of R J^-1 R^T, summed over the two bodies of a joint, and store R J^-1 in ``mobile``."""
     x, y, z = load(inertia[0], 0), load(inertia[1], 0), load(inertia[2], 0)
     u, v, w = load(other_inertia[0], 0), load(other_inertia[1], 0), load(other_inertia[2], 0)
     for i in range(size):
@@ -193,8 +194,9 @@ def _diagonal_tile(about, inertia, mobile, other_about, other_inertia, other_mob
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _couple_points(mobile, about, sign, push, tile, size):
-    """Add +-(S S^T/m + R J^-1 R^T) of two joints at points. S is the unit matrix there, and R starts with -s~, so that
-    g R^T = g x s."""
+    """Add the coupling +-(S S^T/m + R J^-1 R^T) of two spherical or revolute joints to a tile.
+
+    The first three rows of these joints have S = I and R = -s~, so that g R^T = g x s."""
     arm = (about[1, 2], about[2, 0], about[0, 1])
     for i in range(size):
         g = (sign * mobile[i, 0], sign * mobile[i, 1], sign * mobile[i, 2])
@@ -209,7 +211,7 @@ def _couple_points(mobile, about, sign, push, tile, size):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _couple(mobile, about, along, other_along, sign, push, tile, size):
-    """Add +-(S S^T/m + R J^-1 R^T) of any two joints."""
+    """Add the coupling +-(S S^T/m + R J^-1 R^T) of any two joints to a tile."""
     for i in range(size):
         for j in range(size):
             tile[i, j] += push * dot(along[i], other_along[j]) + sign * dot(mobile[i], about[j])
@@ -217,7 +219,7 @@ def _couple(mobile, about, along, other_along, sign, push, tile, size):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _factor(order, scratch, p, size):
-    """Row of tiles p of L, and its part of 1/d; the rows above are known."""
+    """Factor the row of tiles p: compute this row of L and its pivots 1/d from the rows above."""
     tiles, pivots = scratch.tiles, scratch.pivots
     base, first = order.base[p], order.first[p]
     corner = tiles[base + p]
@@ -267,7 +269,7 @@ def _factor(order, scratch, p, size):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _substitute(order, scratch, start, stop, size):
-    """Forward and backward substitution in ``multipliers``."""
+    """Solve for the multipliers of a cluster by forward and backward substitution, in place."""
     tiles, x = scratch.tiles, scratch.multipliers
     for p in range(start, stop):
         tile, base = tiles[order.base[p] + p], order.base[p]

@@ -1,9 +1,9 @@
-"""Order in which the joints' multipliers are solved for: found once per model, so that kernels only loop.
+"""Order in which the multipliers of the joints are solved for, computed once per model.
 
 Two joints couple in D M^-1 D^T if they hold the same moving body. Joints that are connected by such couplings form a
-cluster; clusters do not know of each other. Within a cluster the joints stand in reverse Cuthill-McKee order, which
-makes a chain's matrix block tridiagonal, and the matrix is kept as an envelope: each joint's row of tiles from its
-first coupled joint to itself. Factorisation creates no entries outside of it.
+cluster; clusters are independent of each other. Within a cluster the joints are in reverse Cuthill-McKee order, so that
+the matrix of a chain is block tridiagonal. The matrix is stored as an envelope: the row of tiles of each joint goes
+from its first coupled joint to its diagonal. Factorisation creates no entries outside the envelope.
 
 References
 ----------
@@ -19,21 +19,22 @@ from wrcore.bodies.marker import FRAME
 
 
 class JointOrder(NamedTuple):
-    """Structure of D M^-1 D^T, for kernels; joints are counted in the order of the solver."""
+    """Structure of the matrix D M^-1 D^T; joints are numbered in the order of the solver."""
 
-    clusters: np.ndarray  # (c, 3) int: first joint, one past the last, equations of its largest joint
-    first: np.ndarray  # (n,) int: first joint in each joint's row of the envelope
-    base: np.ndarray  # (n,) int: tile (p, q) of the envelope is number base[p] + q
-    tiles: int  # number of tiles in all
-    first_pair: np.ndarray  # (n + 1,) int: pairs of joint p start here
+    clusters: np.ndarray  # (c, 3) int: first joint, last joint + 1, number of equations of the largest joint
+    first: np.ndarray  # (n,) int: first joint q in the row of each joint p of the envelope
+    base: np.ndarray  # (n,) int: tile (p, q) of the envelope has the index base[p] + q
+    tiles: int  # total number of tiles
+    first_pair: np.ndarray  # (n + 1,) int: index of the first row of ``pairs`` of each joint
     pairs: np.ndarray
-    """(k, 4) int: for each coupling of p to an earlier joint: that joint, the shared body, its end of p and of q."""
-    moving: np.ndarray  # bodies that joints hold
+    """(k, 4) int: couplings of joint p to earlier joints q: q, the shared body, its index (0 or 1) in p and in q."""
+    moving: np.ndarray  # bodies that are held by joints
 
 
 def order_joints(bodies, size):
-    """JointOrder of joints, by the two bodies of each (FRAME for the moving frame) and its equations, which describes
-    their matrix, and the place of each joint of that order in the lists given."""
+    """Return the `JointOrder` of joints and, for each joint of this order, its index in the lists given.
+
+    ``bodies`` are the two bodies of each joint (FRAME for the moving frame), ``size`` its number of equations."""
     clusters = _clusters([{k for k, other in enumerate(bodies) if _shared(ends, other)} for ends in bodies])
     listed = [joint for cluster in clusters for joint in cluster]
     ends = [bodies[k] for k in listed]
@@ -62,12 +63,12 @@ def order_joints(bodies, size):
 
 
 def _shared(ends, other):
-    """Moving bodies that both joints hold."""
+    """Return the moving bodies that both joints hold."""
     return [body for body in ends if body != FRAME and body in other]
 
 
 def _clusters(coupled):
-    """Lists of joints, each in reverse Cuthill-McKee order, from the set of joints that each one couples to."""
+    """Return clusters, lists of joints in reverse Cuthill-McKee order, from the set of joints coupled to each joint."""
     left, clusters = list(range(len(coupled))), []
     while left:
         start = min(_reached(left[0], coupled), key=lambda k: len(coupled[k]))
@@ -78,7 +79,7 @@ def _clusters(coupled):
 
 
 def _reached(start, coupled):
-    """Joints in the order in which they are reached from ``start``, those with few couplings first."""
+    """Return the joints of a cluster in breadth-first order from ``start``, neighbours with few couplings first."""
     found = [start]
     for joint in found:
         found += sorted((k for k in coupled[joint] if k not in found), key=lambda k: (len(coupled[k]), k))

@@ -1,17 +1,19 @@
-"""Markers: points fixed to a body or to the frame that runs along the track."""
+"""Markers: points that are fixed to a body or to the frame that moves along the track."""
 
 from wrcore.bodies.body import OMEGA, STATE_SIZE, VELOCITY
 from wrcore.bodies.vector import load
 from wrcore.kernels.jit import jit
 
 FRAME = -1
-"""Body number of the frame that runs along the track at the scene's speed."""
+"""Body number of the moving frame, which moves along the track at the speed of the scene."""
 
 
 @jit(allocates=False, inline="always")
 def marker_motion(speed, t, state, rotations, body, local_x, local_y, local_z):
-    """Position (m), its part relative to the body's centre (m; zero for the frame) and velocity (m/s), absolute, of a
-    marker in the axes (m) of a body or of FRAME, which runs along a tangent track at ``speed``."""
+    """Return absolute position (m), arm from the body's centre (m; zero for the frame) and velocity (m/s) of a marker.
+
+    ``local_x``, ``local_y``, ``local_z`` are its coordinates (m) in the axes of a body or of FRAME, which moves along a
+    tangent track at ``speed``. All results are in track axes."""
     if body == FRAME:
         return (local_x + speed * t, local_y, local_z), (0.0, 0.0, 0.0), (speed, 0.0, 0.0)
     at = STATE_SIZE * body

@@ -1,13 +1,13 @@
-"""Control laws of the user's own: from the motion to torques of motors and forces of actuators.
+"""Control laws of the user: they compute torques of motors and forces of actuators from the motion of the vehicle.
 
-A law is a function ``law(t, inputs, states, parameters, outputs, following)`` of the time (s), what it measures, its
-own states and its parameters. It writes its outputs, and into ``following`` the rates of its states or, where it is
-sampled, the states that follow. A law without a sampling rate is part of the equations of motion, evaluation by
-evaluation, and of their Jacobian. A sampled one is called at multiples of its period (`take_samples`): its outputs,
-its states and the number of samples taken are internal states of the model that rest in between, so that checkpoints
-hold them and output times find them. No step goes beyond a sample.
+A law is a function ``law(t, inputs, states, parameters, outputs, following)`` of the time (s), the measured inputs, the
+states of the law and its parameters. The law writes its outputs. It also writes the rates of its states into
+``following`` or, if it is sampled, the next states. A law that is not sampled is evaluated in each evaluation of the
+equations of motion and of their Jacobian. A sampled law is called at multiples of its period (`take_samples`). Its
+outputs, its states and the number of samples are internal states of the model, constant between samples, so that
+checkpoints contain them and they are available at output times. No time step extends beyond a sample.
 
-What is measured are the channels of a run: in the axes of the track where the body is.
+The measured inputs are channels of a run, in the axes of the track at the position of the body.
 """
 
 import math
@@ -29,60 +29,60 @@ QUANTITIES = (
     "x_m", "y_m", "z_m", "roll_rad", "yaw_rad", "pitch_rad", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s",
     "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s", "rolling_rate_left_rad_per_s", "rolling_rate_right_rad_per_s",
 )  # fmt: skip
-"""Channels that may be measured, in the order of their numbers."""
+"""Channels that a control law may measure; ``Controls.inputs`` holds an index of this tuple."""
 
-PITCH, SPEEDS, TURNS, ROLLING = 5, 6, 9, 12  # where angles end, velocities, angular velocities, rolling rates begin
+PITCH, SPEEDS, TURNS, ROLLING = 5, 6, 9, 12  # last angle, first velocity, angular velocity, rolling rate
 
 WHAT, BODY, NEAR, APART = range(4)
-"""Columns of ``Controls.inputs``."""
+"""Columns of ``Controls.inputs``: quantity, body, wheelset near the body, difference of rolling rates."""
 
 INPUTS, INPUTS_END, OUTPUTS, OUTPUTS_END, STATES, STATES_END, FIRST, LAST, SAMPLES = range(9)
 """Columns of ``Controls.rows``."""
 
 EARLY = 1e-9
-"""Part of its period by which a sample may come early: rounding of the time."""
+"""Part of the sampling period by which a sample may be taken early, because the time is rounded."""
 
 
 class Controls(NamedTuple):
-    """Control laws, for kernels."""
+    """All control laws of a model as arrays for kernels."""
 
     rows: np.ndarray
-    """(c, 9) int: inputs and outputs i <= k < end of each law; places of its states in the state vector; parameters;
-    place of its number of samples, -1 for one that is not sampled."""
-    period: np.ndarray  # (c,): s; 0 for a law that is not sampled
+    """(c, 9) int: ranges first <= k < end of the inputs, outputs, states (in the state vector) and parameters of each
+    law; index of its number of samples in the state vector, -1 for a law that is not sampled."""
+    period: np.ndarray  # (c,): sampling period, s; 0 for a law that is not sampled
     inputs: np.ndarray
-    """(q, 4) int: quantity, body, the wheelset whose arc length is near, and the place in the state of half the
-    difference of rolling rates, -1 for none."""
-    places: np.ndarray  # (o,) int: where in the state sampled outputs are held; -1 for those of other laws
+    """(q, 4) int: quantity (index of `QUANTITIES`), body, a wheelset whose arc length is close to that of the body, and
+    index in the state of half the difference of rolling rates, -1 for none."""
+    places: np.ndarray  # (o,) int: index in the state of each sampled output; -1 for laws that are not sampled
     parameters: np.ndarray
-    own: np.ndarray  # (c, 4) int: digests of the functions, see `wrcore.kernels.own`
+    own: np.ndarray  # (c, 4) int: digests of the users' functions, see `wrcore.kernels.own`
     start: np.ndarray  # (s,): initial values of the internal states of all laws
     laws: np.ndarray = np.zeros(0, np.int64)  # (c,): addresses of the functions, see `with_control_laws`
 
 
 class ControlWork(NamedTuple):
-    """Scratch arrays, and what an evaluation leaves."""
+    """Work arrays of control laws, and results of the last evaluation."""
 
-    inputs: np.ndarray  # (q,)
-    outputs: np.ndarray  # (o,)
-    following: np.ndarray  # (n,): states that follow those of a sampled law
-    sampling: np.ndarray  # (2,): time of the next sample, s, and whether one is due, see `take_samples`
-    frame: np.ndarray  # (3, 3): axes of the track's frame at the body that is measured
-    place: np.ndarray  # (3,): its arc length, y and z there, m
+    inputs: np.ndarray  # (q,): measured values
+    outputs: np.ndarray  # (o,): outputs of all laws
+    following: np.ndarray  # (n,): next states of a sampled law
+    sampling: np.ndarray  # (2,): whether a sample is due, and time of the next sample, s, see `take_samples`
+    frame: np.ndarray  # (3, 3): axes of the track frame at the measured body
+    place: np.ndarray  # (3,): arc length of the measured body, and its y and z in this frame, m
 
 
 DUE, NEXT_SAMPLE = range(2)
-"""Places in ``ControlWork.sampling``."""
+"""Indices of ``ControlWork.sampling``."""
 
 
 def no_controls():
-    """`Controls` of nothing."""
+    """Return `Controls` without any control law."""
     whole, empty = np.zeros((0, 4), np.int64), np.zeros(0)
     return Controls(np.zeros((0, 9), np.int64), empty, whole, np.zeros(0, np.int64), empty, whole, empty)
 
 
 def control_work(controls):
-    """Allocate the scratch arrays."""
+    """Allocate the work arrays of the control laws."""
     longest = int(np.max(controls.rows[:, STATES_END] - controls.rows[:, STATES], initial=0))
     sizes = len(controls.inputs), len(controls.places), longest
     return ControlWork(*map(np.zeros, sizes), np.zeros(2), np.eye(3), np.zeros(3))
@@ -94,12 +94,12 @@ def samples(model):
 
 
 def wrapped(function, note):
-    """The kernel of a control law's function, whose results ``note`` looks at."""
+    """Return a kernel that calls a control law and passes sums of its inputs and results to ``note``."""
 
     def call(t, inputs, states, parameters, outputs, following):
         given = sum_of(inputs) + sum_of(states)
         function(t, inputs, states, parameters, outputs, following)
-        if sum_of(inputs) + sum_of(states) != given:  # the law wrote to what it may only read
+        if sum_of(inputs) + sum_of(states) != given:  # the law wrote into its inputs or states, which are read-only
             outputs[:] = np.nan
         note(given, sum_of(outputs) + sum_of(following[: states.shape[0]]))
 
@@ -114,7 +114,7 @@ def wrapped(function, note):
 
 
 def with_control_laws(controls):
-    """The controls with the addresses of their functions."""
+    """Return the controls with the addresses of the compiled laws."""
     if not len(controls.own):
         return controls
     example = tuple(map(own.Example, (0.0, *[np.empty(0)] * 5)))
@@ -123,7 +123,9 @@ def with_control_laws(controls):
 
 
 def with_controls(model, kind, scratch, state):
-    """The model with the addresses of what its control laws need; the arguments are examples for kernels."""
+    """Return the model with the addresses of its control laws, and a dict of the kernels that evaluate them.
+
+    The arguments are examples that determine the types of the kernels' arguments."""
     kernels = {"torques": Kernel(add_controlled, kind, 0.0, state, scratch, state).address}
     if samples(model):
         kernels["samples"] = Kernel(take_samples, kind, 0.0, state, scratch, False).address
@@ -131,8 +133,10 @@ def with_controls(model, kind, scratch, state):
 
 
 def control_links(model):
-    """For each law that is not sampled: the bodies that it measures or that its outputs act on, and the internal states
-    that it reads or changes. Arc lengths are left out, see `wrcore.forces.drive.drive_links`."""
+    """Return the sets of bodies and of internal states that each law that is not sampled couples.
+
+    These are the bodies that the law measures or on which its outputs act, and the internal states that it reads or
+    changes. Arc lengths are neglected, see `wrcore.forces.drive.drive_links`."""
     controls, drive, found, inner = model.controls, model.drive, [], STATE_SIZE * len(model.bodies.mass)
     independent = {int(wheelset): int(state) for wheelset, state in model.bodies.independent}
     for row, period in zip(controls.rows, controls.period, strict=True):
@@ -152,7 +156,7 @@ def control_links(model):
 
 @jit(allocates=False)
 def _go_to(model, body, near, state, work):
-    """Put the track's frame where a body is, which is near the k-th wheelset."""
+    """Compute the track frame and the coordinates of a body in this frame; ``near`` is a wheelset close to the body."""
     at, path, frame, place = STATE_SIZE * body, model.track.path, work.control.frame, work.control.place
     x, y, z = load(state, at)
     if not model.track.tangent:
@@ -165,7 +169,7 @@ def _go_to(model, body, near, state, work):
 
 @jit(allocates=False)
 def _measured(model, q, state, work):
-    """Value of the q-th input, whose body the track's frame in ``work`` is at."""
+    """Return the value of the q-th input; `_go_to` must have moved the track frame in ``work`` to its body."""
     row, frame = model.controls.inputs[q], work.control.frame
     what, at = row[WHAT], STATE_SIZE * row[BODY]
     if what >= ROLLING:
@@ -181,7 +185,7 @@ def _measured(model, q, state, work):
 
 @jit(allocates=False)
 def _run_law(model, c, t, state, work, following):
-    """Measure, and call the c-th law."""
+    """Measure the inputs of the c-th law and call the law."""
     controls, row = model.controls, model.controls.rows[c]
     inputs, outputs, body = work.control.inputs, work.control.outputs, -1
     for q in range(row[INPUTS], row[INPUTS_END]):
@@ -197,7 +201,7 @@ def _run_law(model, c, t, state, work, following):
 
 @jit(allocates=False)
 def add_controlled(model, t, state, work, rate):
-    """Find the outputs of all laws, write the rates of their states, and add the torques of motors and brakes."""
+    """Compute the outputs of all laws and the rates of their states, and add the torques of motors and brakes."""
     controls = model.controls
     for c in range(controls.rows.shape[0]):
         row = controls.rows[c]
@@ -214,8 +218,10 @@ def add_controlled(model, t, state, work, rate):
 
 @jit(allocates=False)
 def take_samples(model, t, state, work, taking):
-    """Say in ``work`` whether a sample is due at a time (s), and when the next one is. If ``taking``, take those that
-    are due, into ``state``, whose evaluation has left rotations and arc lengths in ``work``."""
+    """Write into ``work`` whether a sample is due at the time t (s), and the time of the next sample.
+
+    If ``taking``, call the laws that are due and write their samples into ``state``. The rotations and arc lengths in
+    ``work`` must be those of this state."""
     controls, sampling = model.controls, work.control.sampling
     sampling[DUE], sampling[NEXT_SAMPLE] = 0.0, math.inf
     for c in range(controls.rows.shape[0]):
@@ -223,7 +229,7 @@ def take_samples(model, t, state, work, taking):
         if period == 0.0:
             continue
         count = state[row[SAMPLES]]
-        if t >= (count - EARLY) * period or t < (count - 1.0 - EARLY) * period:  # or it began anew at an earlier time
+        if t >= (count - EARLY) * period or t < (count - 1.0 - EARLY) * period:  # or time was reset
             sampling[DUE] = 1.0
             count = math.floor(t / period + EARLY) + 1.0
             if taking:

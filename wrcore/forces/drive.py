@@ -1,25 +1,25 @@
-"""Motors, brakes and a speed controller: torques about axles, against the bodies that carry motors and calipers.
+"""Motors, brakes and a speed controller: torques about axles, with reactions on the bodies that carry them.
 
-A torque M along the axle e (pointing left: M > 0 drives forward) acts on a wheelset, its opposite on the body that
-takes the reaction, so that the pair gains no angular momentum, and the power put in is M times the relative rotation
-rate omega = e . (w_wheelset - w_body). With the moving frame as that body the reaction leaves the vehicle.
+A torque M along the axle e (pointing left: M > 0 drives forward) acts on a wheelset, and -M on the body that takes the
+reaction, so that the pair gains no angular momentum. The power input is M times the relative rotation rate
+omega = e . (w_wheelset - w_body). If the moving frame is that body, no reaction acts on the vehicle.
 
-On a wheelset whose wheels turn independently of each other a torque acts on one of them, and omega is that wheel's.
+On a wheelset with independently rotating wheels a torque acts on one wheel, and omega is the rate of that wheel.
 
-*Motor*: M by a table, or as a control law commands (:mod:`wrcore.forces.control`). *Brake*:
-M = -M_b tanh(omega/`GRIP`), with M_b by a table: a friction brake whose sign changes within some `GRIP`, so that it
-holds at standstill and takes energy at every instant. *Controller*: proportional and integral, on the speed v of a body
-along its own x axis, with limits of the force at the wheels' rims,
+*Motor*: M from a table, or from a control law (:mod:`wrcore.forces.control`). *Brake*: M = -M_b tanh(omega/`GRIP`),
+with M_b from a table. The sign of this friction torque changes over a few `GRIP`, so that the brake holds at standstill
+and always dissipates energy. *Controller*: a proportional-integral controller of the speed v of a body along the
+body's x axis, with limits of the force at the wheel rims,
 
     F = clip(F*, -brake limit, limit),   F* = Kp (v* - v) + Ki z,   z' = v* - v - (F* - F)/Kp,
 
-shared equally among the motors that state no torque of their own. Where a limit holds, the last term lets the
-integral follow it (back-calculation): nothing winds up.
+shared equally among the motors without a given torque. At a limit, the last term makes the integral follow the limit
+(back-calculation), which prevents integrator windup.
 
 References
 ----------
 Astrom, Hagglund, PID Controllers: Theory, Design, and Tuning (1995), section 3.5 (back-calculation; here with the
-tracking time Kp/Ki over the integral's own gain).
+tracking time Kp/Ki over the gain of the integral).
 """
 
 import math
@@ -38,45 +38,45 @@ MOTOR, BRAKE, CONTROLLED, COMMANDED = range(4)
 """Kinds of actuators."""
 
 WHEELSET, REACTION, NUMBER, KIND, TABLE, OVER, WHEEL = range(7)
-"""Columns of ``Drive.rows``."""
+"""Columns of ``Drive.rows``; OVER is `TIME` or `ARC_LENGTH`."""
 
 BODY, FOREMOST, SPEED, SPEED_OVER = range(4)
-"""Columns of ``Drive.control``."""
+"""Columns of ``Drive.control``; SPEED is the table of the set speed."""
 
 PROPORTIONAL, INTEGRAL, LEAST, MOST = range(4)
-"""Columns of ``Drive.gains``."""
+"""Columns of ``Drive.gains``; LEAST and MOST are the limits of the force."""
 
 TIME, ARC_LENGTH = range(2)
-"""What a table is over."""
+"""Abscissa of a table."""
 
 GRIP = 0.05
-"""Relative rotation rate at which a brake has tanh(1) = 76 % of its torque, rad/s. Chosen: some 2 cm/s at the rim."""
+"""Relative rotation rate at which a brake has tanh(1) = 76 % of its torque, rad/s; chosen, about 2 cm/s at the rim."""
 
 
 class Drive(NamedTuple):
-    """Motors, brakes and controller, for kernels."""
+    """Motors, brakes and the speed controller of a model as arrays for kernels."""
 
     rows: np.ndarray
     """(m, 7) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
-    kind, table (or output of a control law), what that is over, and the wheel that turns by itself: 1 for the left
-    one, -1 for the right one, 0 for a solid wheelset."""
-    lever: np.ndarray  # (m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)
+    kind, table (or output of a control law), abscissa of the table, and the wheel on which the torque acts: 1 for the
+    left and -1 for the right independent wheel, 0 for a solid wheelset."""
+    lever: np.ndarray  # (m,): torque per unit of the table or of the controller's force: 1 or a radius (m)
     control: np.ndarray
-    """(c, 4) int, c = 0 or 1: body whose speed counts, number of the wheelset whose arc length does, table, what that
-    is over."""
+    """(c, 4) int, c = 0 or 1: body whose speed is controlled, number of the wheelset whose arc length enters the table,
+    table of the set speed, abscissa of the table."""
     gains: np.ndarray  # (c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)
     tables: Schedules
 
 
 def no_drive():
-    """A `Drive` of nothing."""
+    """Return a `Drive` without motors, brakes and controller."""
     return Drive(
         np.zeros((0, 7), np.int64), np.zeros(0), np.zeros((0, 4), np.int64), np.zeros((0, 4)), pack_schedules([])
     )
 
 
 def undriven(model):
-    """The model without motors, brakes, controller and control laws: its state ends with that of force elements."""
+    """Return the model without motors, brakes, controller, control laws and their internal states."""
     if not (len(model.drive.rows) or len(model.drive.control) or len(model.controls.rows)):
         return model
     none = model.controls._make(array[:0] for array in model.controls)
@@ -84,14 +84,16 @@ def undriven(model):
 
 
 def may_drive(model):
-    """Whether motors, brakes or a controller can ever exert a torque."""
+    """Whether motors, brakes, a controller or control laws may exert a torque at any time."""
     driven = len(model.drive.control) > 0 or len(model.controls.rows) > 0
     return driven or bool(model.drive.tables.points[:, 1].any())
 
 
 def lowest_speed(model):
-    """Speed (m/s) to which motors, brakes and a controller may bring a vehicle that runs forward down, infinite where
-    they cannot: of all that may brake it is known of a controller alone where that ends."""
+    """Return the lowest speed (m/s) to which motors, brakes and a controller may brake a forward-running vehicle.
+
+    This is 0 if motors, brakes or control laws may brake, else the lowest set speed of the controller. It is infinite
+    if no torque can brake the vehicle."""
     drive, points = model.drive, np.split(model.drive.tables.points[:, 1], model.drive.tables.starts[1:-1])
     brakes = len(model.controls.rows) > 0
     for row in drive.rows[np.isin(drive.rows[:, KIND], (MOTOR, BRAKE))]:
@@ -101,8 +103,9 @@ def lowest_speed(model):
 
 
 def drive_links(model):
-    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration. A speed
-    profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link from one
+    """Return pairs of bodies coupled by motors, brakes or the controller: the motion of one accelerates the other.
+
+    The coupling through the arc length of a speed profile is neglected. Its effect is very small, and coupling one
     wheelset to all others would double the cost of a Jacobian."""
     pairs = [(row[WHEELSET], row[REACTION]) for row in model.drive.rows if row[REACTION] != FRAME]
     for body in model.drive.control[:, BODY]:
@@ -111,20 +114,21 @@ def drive_links(model):
 
 
 def drive_state_bodies(model):
-    """For the controller's integral, if there is one, the set of bodies that it acts on or follows."""
+    """Return, for the integral of each controller, the set of bodies that it accelerates or measures."""
     return [{int(body)} | _controlled(model) for body in model.drive.control[:, BODY]]
 
 
 def _controlled(model):
-    """Bodies that the controller's force acts on."""
+    """Return the set of bodies on which the force of the controller acts."""
     rows = model.drive.rows
     return set(rows[rows[:, KIND] == CONTROLLED][:, [WHEELSET, REACTION]].ravel().tolist()) - {FRAME}
 
 
 @jit(allocates=False)
 def independent_wheels_at(bodies, k):
-    """Place in the state of half the difference of rolling rates of the k-th wheelset; that of the last independent one
-    if it has none."""
+    """Return the index in the state of half the difference of rolling rates of the k-th wheelset.
+
+    For a solid wheelset the result is the index of the last wheelset with independent wheels."""
     place = -1
     for j in range(bodies.independent.shape[0]):
         place = bodies.independent[j, 1]
@@ -135,13 +139,13 @@ def independent_wheels_at(bodies, k):
 
 @jit(allocates=False)
 def _table_value(model, table, over, k, t, state, work):
-    """Value of a table at the time, or at the arc length of the k-th wheelset."""
+    """Return the value of a table at the time, or at the arc length of the k-th wheelset."""
     return scheduled(model.drive.tables, table, arc_length_at(model, state, work, k) if over == ARC_LENGTH else t)
 
 
 @jit(allocates=False)
 def controlled_force(model, t, state, work):
-    """The controller's force at the rims (N), the speed that it wants (m/s), and the rate of its integral (m/s)."""
+    """Return force of the controller at the wheel rims (N), set speed (m/s), and rate of the integral (m/s)."""
     if model.drive.control.shape[0] == 0:
         return 0.0, 0.0, 0.0
     row, gains, n = model.drive.control[0], model.drive.gains[0], model.bodies.mass.shape[0]
@@ -155,7 +159,7 @@ def controlled_force(model, t, state, work):
 
 @jit(allocates=False)
 def actuator(model, i, force, t, state, work):
-    """Torque of the i-th actuator along the axle of its wheelset (N m), and the relative rotation rate (rad/s)."""
+    """Return the torque of the i-th actuator along the axle (N m) and its relative rotation rate (rad/s)."""
     row = model.drive.rows[i]
     axes, kind, rate = work.rotations[row[WHEELSET]], row[KIND], 0.0
     for k in range(3):
@@ -176,8 +180,10 @@ def actuator(model, i, force, t, state, work):
 
 @jit(allocates=False)
 def add_drive(model, t, state, work, rate):
-    """Add the torques of motors and brakes to the wrenches of the bodies, and write the rate of the controller's
-    integral (m/s) into ``rate``; ``work`` has the rotations and arc lengths of this state."""
+    """Add the torques of motors and brakes to the wrenches of the bodies.
+
+    Also write the rate of the controller's integral (m/s) into ``rate``, and add the torques on independent wheels to
+    their rates. ``work`` must have the rotations and arc lengths of this state."""
     force, _, change = controlled_force(model, t, state, work)
     if model.drive.control.shape[0] > 0:
         rate[STATE_SIZE * model.bodies.mass.shape[0] + model.elements.states] = change

@@ -1,4 +1,4 @@
-"""What a kind of force element says of itself: its keys, what it is made of, its laws, and how it is drawn."""
+"""Description of a kind of force element: its keys, parts, force laws, and marker in pictures."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -9,37 +9,40 @@ import numpy as np
 
 ZERO = (0.0, 0.0, 0.0)
 MOST = 1e15
-"""Largest number of a key: far beyond anything that rolls."""
+"""Largest number that a key accepts; larger than any value of a real vehicle."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of force element; the first line of its module says what it does."""
+    """Description of one kind of force element; the first line of the module of a kind describes it for users."""
 
     keys: Mapping[str, dict]
-    """JSON schema of each key beside name, kind and bodies, with its unit as "in UNIT" in the description."""
+    """JSON schema of each key except name, kind and bodies; its description states the unit as "in UNIT"."""
     needed: tuple[str, ...]
-    """Keys that it cannot do without."""
+    """Names of the required keys."""
     mark: Mapping[str, str]
-    """Its look in pictures, as matplotlib has it; markers tell kinds apart in grey."""
+    """Marker and color in pictures, as keywords of matplotlib; the marker identifies the kind in grey pictures."""
     parts: Callable[..., list]
-    """The `Spring`, `Turning` and `Along` that an element (dict) is made of; with ``first_load`` also of the load."""
+    """Function that returns the parts (`Spring`, `Turning`, `Along`) of an element (dict). If ``first_load`` is given,
+    its second argument is the load (N)."""
     check: Callable[[dict], Iterator[tuple[str, str]]] = lambda item: iter(())
-    """Keys and what was expected of them, for what its schema cannot say; an empty key stands for the element."""
+    """Function that yields faults that the schema cannot express: key (empty: the element) and expectation."""
     laws: tuple = ()
-    """Kernels of its parts along one direction, see `wrcore.forces.law`."""
+    """Kernels of the laws of its `Along` parts, see `wrcore.forces.law`."""
     first_load: Callable[[dict], float] | None = None
-    """Vertical load (N) with which the search for the one begins that it carries, if its parts depend on it."""
+    """Function that returns the vertical load (N) at which the search for the static load of the element starts. None
+    if the parts do not depend on the load."""
 
     @cached_property
     def schema(self) -> dict:
-        """JSON schema of its keys."""
+        """JSON schema of the keys of this kind."""
         return {"properties": self.keys}
 
 
 class Spring(NamedTuple):
-    """Spring and damper along the three axes of the second body, at the first of its ``ends`` (2, 3); a ``preload`` (N)
-    of None is found, along z."""
+    """Spring and damper along the three axes of the second body, at the first of its ``ends`` (2, 3).
+
+    If ``preload`` (N) is None, wrcore computes the preload along z."""
 
     ends: np.ndarray
     stiffness: Any = ZERO
@@ -48,8 +51,10 @@ class Spring(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """Spring and damper against relative rotation about the three axes of the second body. At a wheelset, values of the
-    element's ``keys`` for pitch are errors, and its place is on the axle, but for what may be ``anywhere``."""
+    """Spring and damper against relative rotation about the three axes of the second body.
+
+    At a wheelset, pitch values in the element's ``keys`` are errors, and the element must be on the axle unless it may
+    be ``anywhere``."""
 
     ends: np.ndarray
     stiffness: Any = ZERO
@@ -60,69 +65,70 @@ class Turning(NamedTuple):
 
 
 class Along(NamedTuple):
-    """What acts along one direction by a law: a unit vector in the second body's axes, or the line between the ends."""
+    """Force element along one direction: unit vector in the axes of the second body, or the line between the ends."""
 
     ends: np.ndarray
     law: Any
-    """A kernel, or an `wrcore.kernels.own.Own` function."""
+    """Force law: a kernel, or a function of the user (`wrcore.kernels.named_laws.UserFunction`)."""
     axis: np.ndarray | None
     numbers: Any = ()
-    """At most six for the law (any number for one of the user's own), or a function that returns them, of the force
-    that presses in nominal position (N)."""
+    """Parameters of the law: at most six, or any number for a law of the user; or a function that returns them from
+    the normal force (N) in nominal position."""
     points: np.ndarray | None = None
-    """(q, 2): polygon of force over displacement or speed, or the inverse of it."""
+    """(q, 2): polygon of force over displacement or speed, or its inverse."""
     inner: int = 0
-    """Number of internal states: at most one, but for a law of the user's own."""
+    """Number of internal states; at most one, except for a law of the user."""
     slope: float = 0.0
-    """Stiffness with which it may carry weight, N/m."""
+    """Stiffness along the direction with which the element may carry weight, N/m."""
     preload: float = 0.0
-    """Force on the first body along the axis in nominal position, N, for statics; the law has it among its numbers."""
+    """Force on the first body along the axis in nominal position, N, for statics; it is also one of ``numbers``."""
     presses: float | None = None
-    """The same of what may press friction, which has no internal state."""
+    """Force on the first body along the axis in nominal position, N, of an element that may act as the normal force of
+    a friction element. Such an element has no internal state."""
     normal: str | None = None
-    """Name of the element that presses on it."""
+    """Name of the element whose force is the normal force of this friction element."""
     odd: bool = True
-    """Whether its law, but for ``points``, is the same seen from either body."""
+    """Whether the law without ``points`` is an odd function, unchanged when first and second body are exchanged."""
 
 
 def ends_of(item):
-    """Points (2, 3) at which an element acts on its first and its second body, m."""
+    """Return the points (2, 3) at which an element acts on its first and its second body, m."""
     at = np.array(item.get("at", ZERO), float).reshape(-1, 3)
     return at[[0, -1]]
 
 
 def middle_of(item):
-    """The point half-way between the ends of an element, twice."""
+    """Return the midpoint of the ends of an element twice, (2, 3), m."""
     here, there = ends_of(item)
     return np.array([0.5 * (here + there)] * 2)
 
 
 def axis_of(item):
-    """Unit vector of an element's ``direction``; None for a line."""
+    """Return the unit vector of an element's ``direction``; None for a line."""
     return None if item["direction"] == "line" else np.eye(3)["xyz".index(item["direction"])]
 
 
 def polygon(x, force):
-    """Points (q, 2) of a characteristic; from (0, 0) on it is continued as an odd function."""
+    """Return the points (q, 2) of a characteristic; if it starts at (0, 0), it is continued as an odd function."""
     points = np.column_stack([x, force]).astype(float)
     return points if np.any(points[0]) else np.vstack([-points[:0:-1], points])
 
 
 def number(description, least=0.0, most=MOST, **more):
-    """Schema of a key that holds one number; ``description`` names other bounds than 0 and `MOST`."""
+    """Return the schema of a key that holds one number; ``description`` must name bounds other than 0 and `MOST`."""
     said = f"{description}, not negative" if (least, most) == (0.0, MOST) else description
     return {"type": "number", "minimum": least, "maximum": most, "description": said, **more}
 
 
 def three(description, least=0.0, axes="[x, y, z]"):
-    """Schema of a key that holds a number for each axis of the second body."""
+    """Return the schema of a key that holds one number for each axis of the second body."""
     inner = {"type": "number", "minimum": least, "maximum": MOST}
     return {"type": "array", "minItems": 3, "maxItems": 3, "items": inner,
             "description": f"three numbers {axes}{'' if least else ', none negative'}: {description}"}  # fmt: skip
 
 
 def about(description):
-    """Schema of a key that holds a number for each rotation."""
+    """Return the schema of a key that holds one number for each of roll, pitch and yaw."""
     return three(description, axes="[roll, pitch, yaw]")
 
 
@@ -145,7 +151,7 @@ PARAMETERS = {
 
 
 def curve(abscissa, unit):
-    """Schema of a key that holds a characteristic."""
+    """Return the schema of a key that holds a characteristic: force over ``abscissa``, in ``unit``."""
     numbers = {"type": "array", "minItems": 2, "maxItems": 1000,
                "items": {"type": "number", "minimum": -MOST, "maximum": MOST}}  # fmt: skip
     return {
@@ -158,7 +164,7 @@ def curve(abscissa, unit):
 
 
 def faults_of(item, abscissa):
-    """What is wrong with an element's characteristic."""
+    """Yield the faults of an element's characteristic: key and expectation."""
     if "characteristic" not in item:
         return
     x, force = (np.array(item["characteristic"][key], float) for key in (abscissa, "force"))

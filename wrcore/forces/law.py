@@ -1,31 +1,32 @@
-"""What the laws of elements along one direction share.
+"""Data that all force laws of elements along one direction share.
 
-A law is a kernel ``law(elements, k, stretch, speed, inner, press)`` of the k-th element along one direction: its
-stretch (m) and its rate (m/s), its internal state, and the force in the element that presses it (N; 0 without one).
-It returns the force against stretch (N), the rate of the internal state, the stored energy (J) and the dissipated
-power (W): the first two are those of the equations of motion, whose power less what is dissipated goes into the store.
-A law is called by its address: it is compiled for scenes that have such an element, and costs others nothing.
+A law is a kernel ``law(elements, k, stretch, speed, inner, press)`` of the k-th element along one direction. Its
+arguments are the stretch (m), the rate of stretch (m/s), the internal state, and the normal force in another element
+(N; 0 without such an element). It returns the force against stretch (N), the rate of the internal state, the stored
+energy (J) and the dissipated power (W). Force and rate enter the equations of motion. The rate of the stored energy is
+the power of the force less the dissipated power. A law is called by its address, so that only scenes with such an
+element compile the law.
 """
 
 from wrcore.kernels.jit import FUSED, jit
 
 MARKER, REST, LENGTH, AXIS, NUMBERS = 0, 3, 6, 7, 10
-"""First columns of a row of ``Elements.directed``."""
+"""First columns of the quantities in a row of ``Elements.directed``."""
 
 MOST_NUMBERS = 6
-"""Of a law."""
+"""Largest number of parameters of a law."""
 
 ON_LINE, LAW, FIRST, LAST, INNER, PRESSING_SPRING, PRESSING = range(7)
 """Columns of ``Elements.law``."""
 
 LAWS: list = []
-"""All laws of `wrcore.forces.kinds`; a law's number in kernels is its place here. Those of the user's own have
-numbers below 0: -1 for the first row of ``Elements.own``, and so on."""
+"""All laws of `wrcore.forces.kinds`; the number of a law in kernels is its index in this list. Laws of the user have
+negative numbers: -1 for the first row of ``Elements.own``, and so on."""
 
 
 @jit(allocates=False, inline="always")
 def numbers(elements, k):
-    """The six numbers of an element along one direction that its law reads."""
+    """Return the six parameters of the law of the k-th element along one direction."""
     row = elements.directed[k]
     return (
         row[NUMBERS], row[NUMBERS + 1], row[NUMBERS + 2], row[NUMBERS + 3], row[NUMBERS + 4], row[NUMBERS + 5],
@@ -34,7 +35,9 @@ def numbers(elements, k):
 
 @jit(allocates=False, fastmath=FUSED)
 def characteristic(elements, k, x):
-    """Value at x of an element's polygon, continued with its outer slopes, and its integral from 0 to x."""
+    """Return the value at x of the k-th element's polygon, and its integral from 0 to x.
+
+    Beyond its ends the polygon continues with the slopes of its outer segments."""
     table, at, last = elements.table, elements.law[k, FIRST], elements.law[k, LAST]
     while at < last - 2 and x > table[at + 1, 0]:
         at += 1

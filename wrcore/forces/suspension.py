@@ -1,25 +1,25 @@
 """Force elements between two bodies, evaluated pair by pair.
 
-All elements between one first body i and one second body j share the relative motion of the two, which is computed
-once in the axes of j: with A the rotation matrices, r the positions, v the velocities and w the angular velocities,
+All elements between a first body i and a second body j share the relative motion of the two bodies, which is computed
+once in the axes of j. With rotation matrices A, positions r, velocities v and angular velocities w,
 
     R = Aj^T Ai,  rho = Aj^T (ri - rj),  u = Aj^T (vi - vj - wj x (ri - rj)),  W = Aj^T (wi - wj).
 
-A marker m of i and a marker n of j are then apart by d = rho + R m - n, at the rate d' = u + W x R m. A force F on i
-acts at i's marker; the opposite force acts on j at that same point, so that the pair gains neither angular momentum
-nor, without dampers, energy: with U(d) the spring's energy, F = -dU/dd is its force along the axes of j exactly. The
-same holds for rotation stiffnesses (kx, ky, kz) about the axes of j: their moment is that of the energy
+The distance vector of a marker m of i from a marker n of j is d = rho + R m - n, its rate is d' = u + W x R m. A force
+F on i acts at the marker of i, and -F acts on j at this point. The pair gains no angular momentum and, without dampers,
+no energy: F = -dU/dd is exactly the force of a spring with the energy U(d), in the axes of j. The moment of rotation
+stiffnesses (kx, ky, kz) about the axes of j is likewise that of the energy
 
     U(R) = c . (1 - diag R),   cx = (ky + kz - kx)/2 and so on,
 
 which is kx roll^2/2 + ky pitch^2/2 + kz yaw^2/2 for small angles and kx (1 - cos roll) for a rotation about x alone.
-Cubic stiffnesses hx, hy, hz add hx Tx^2 + hy Ty^2 + hz Tz^2 with Tx = (1 + Rxx - Ryy - Rzz)/2 and so on, which is what
-a stiffness of 1 stores: to kx they add 2 hx Tx, for small angles hx roll^2.
+Cubic stiffnesses hx, hy, hz add hx Tx^2 + hy Ty^2 + hz Tz^2, with Tx = (1 + Rxx - Ryy - Rzz)/2 and so on, the energy of
+a unit stiffness. They increase kx by 2 hx Tx, which is hx roll^2 for small angles.
 
-Along one direction an element acts by a law (`wrcore.forces.law`), one of its kind's. What all parts of a pair store
-and lose is found beside their forces, so that the two cannot differ; the equations of motion leave it out.
+An element along one direction follows a force law of its kind (`wrcore.forces.law`). Stored energy and dissipated power
+of a pair are computed together with its forces, so that they are consistent; the equations of motion do not use them.
 
-The angular velocity w of a wheelset leaves out the spin (its frame does not spin, see wrcore.bodies.body).
+The angular velocity w of a wheelset excludes the spin (its frame does not spin, see wrcore.bodies.body).
 """
 
 import math
@@ -37,48 +37,48 @@ from wrcore.kernels.named_laws import UserFunction, text_digest
 from wrcore.track.track import moving_frame, turned_back, turned_into
 
 STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
-"""Columns of a row of ``Elements.springs``, which begins as one of ``Elements.directed``."""
+"""First columns in a row of ``Elements.springs``; its markers are in the columns of ``Elements.directed``."""
 
 
 class Elements(NamedTuple):
-    """Force elements of a model, sorted by pair, for kernels."""
+    """All force elements of a model as arrays for kernels, sorted by pair of bodies."""
 
-    pairs: np.ndarray  # (p, 2) int: first and second body; FRAME as the second one for the moving frame
-    offset: np.ndarray  # (p,): for the moving frame, arc length of its cross-section from the frame's origin, m
+    pairs: np.ndarray  # (p, 2) int: first and second body; the second may be FRAME, the moving frame
+    offset: np.ndarray  # (p,): arc length of the element from the origin of the moving frame, m
     turning: np.ndarray
     """(p, 3, 3): factors c of the energy U(R) (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) about
     the second body's axes."""
     first_spring: np.ndarray  # (p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]
     springs: np.ndarray
-    """(n, 15): along all three axes; marker of i, position relative to j at which the element is at rest (m),
+    """(n, 15), elements along all three axes: marker of i (m), position relative to j without spring force (m),
     stiffness (N/m), damping (N s/m), preload (N, on i)."""
-    first_directed: np.ndarray  # (p + 1,) int, as first_spring
+    first_directed: np.ndarray  # (p + 1,) int: elements k of pair p, first_directed[p] <= k < first_directed[p + 1]
     directed: np.ndarray
-    """(m, 16): along one direction; marker of i, marker of j or rest position (m), length at rest (m) on a line, unit
-    vector in j's axes elsewhere, and six numbers that its law reads."""
+    """(m, 16), elements along one direction: marker of i, marker of j or rest position (m), length at rest (m; for a
+    line), unit vector in the axes of j (zero for a line), and six parameters of the law."""
     law: np.ndarray
-    """(m, 7) int: whether on a line, number of the law, first and last + 1 point of the characteristic, number of the
-    internal state; the spring and the element along one direction that press, -1 for none."""
+    """(m, 7) int: whether along a line, number of the law, first and last + 1 point of the characteristic, number of
+    the internal state; the spring or directed element whose force is the normal force, -1 for none."""
     table: np.ndarray
-    """(q, 3): points of all characteristics, displacement or speed and force (or the inverse); integral from 0."""
+    """(q, 3): points of all characteristics: displacement or speed, force (or the inverse), integral from 0."""
     states: int
-    """Number of internal states: displacements (m) of dampers that act in series with a spring; and what else is
-    counted with them, see `wrcore.equations.equations_of_motion.fill_derivatives`."""
-    laws: np.ndarray = np.zeros(0, np.int64)  # addresses of the laws by their number, see `with_laws`
+    """Number of internal states: displacements (m) of dampers in series with a spring, and the states of wheels and
+    track that follow them, see `wrcore.equations.equations_of_motion.fill_derivatives`."""
+    laws: np.ndarray = np.zeros(0, np.int64)  # address of each law by its number, see `with_laws`
     own: np.ndarray = np.zeros((0, 4), np.int64)
-    """(o, 4): digests of the laws of the user's own (`wrcore.kernels.own`), and of those of other packages."""
-    own_laws: np.ndarray = np.zeros(0, np.int64)  # (o,): their addresses, see `with_laws`
-    parameters: np.ndarray = np.zeros(0)  # of own laws, whose places stand where others have points
+    """(o, 4): digests of the laws of the user (`wrcore.kernels.own`) and of other packages."""
+    own_laws: np.ndarray = np.zeros(0, np.int64)  # (o,): addresses of the laws of the user, see `with_laws`
+    parameters: np.ndarray = np.zeros(0)  # of laws of the user; columns FIRST, LAST give the range
 
 
 def pack_elements(springs=(), directed=(), turning=()):
-    """Sort elements by pair (first body, second body, offset).
+    """Return `Elements` sorted by pair (first body, second body, offset).
 
-    ``springs``: (pair, the 15 numbers of a row of ``Elements.springs``). ``directed``: (pair, the first 10 of
-    ``Elements.directed``, law, at most six numbers for it, points (q, 2) of the characteristic or None, the number of
-    internal states, the element that presses: None, or (0, k) and (1, k) for the k-th of ``springs`` and of
-    ``directed``). ``turning``: (pair, stiffness, damping, cubic stiffness) against relative rotation about the second
-    body's axes, three numbers each; summed pair by pair.
+    ``springs``: (pair, the 15 numbers of a row of ``Elements.springs``). ``directed``: (pair, the first 10 numbers of a
+    row of ``Elements.directed``, law, its parameters, points (q, 2) of the characteristic or None, number of internal
+    states, element of the normal force). The latter is None, (0, k) for the k-th of ``springs``, or (1, k) for the k-th
+    of ``directed``. ``turning``: (pair, stiffness, damping, cubic stiffness) against relative rotation about the second
+    body's axes, three numbers each; they are summed for each pair.
     """
     pairs = sorted({item[0] for group in (springs, directed, turning) for item in group})
     orders = [sorted(range(len(group)), key=lambda k: group[k][0]) for group in (springs, directed)]
@@ -122,7 +122,7 @@ def pack_elements(springs=(), directed=(), turning=()):
 
 
 def _with_integral(points):
-    """Points of a characteristic with its integral from 0 to each, shape (q, 3); none for None."""
+    """Return the points of a characteristic and its integral from 0 to each point, (q, 3); (0, 3) for None."""
     if points is None:
         return np.zeros((0, 3))
     x, y = points.T
@@ -133,7 +133,7 @@ def _with_integral(points):
 
 
 def with_laws(elements):
-    """The elements with the addresses of the laws that they follow: these alone are compiled."""
+    """Return the elements with the addresses of their laws; only laws that an element uses are compiled."""
     addresses, example = np.zeros(len(law.LAWS), np.int64), Kind(elements)
     own = np.zeros(len(elements.own), np.int64)
     for number in np.unique(elements.law[:, law.LAW]):
@@ -148,8 +148,9 @@ def with_laws(elements):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def relative_motion(elements, p, track, t, speed, state, rotations, turns):
-    """Relative motion of a pair, R column by column, rho, u and W; beside it the axes of the second body and, in track
-    axes, ri - rj, vj and wj."""
+    """Return the relative motion (R by columns, rho, u, W) of a pair, in the axes of its second body.
+
+    Also return these axes and, in track axes, ri - rj, vj and wj."""
     i, j = elements.pairs[p, 0], elements.pairs[p, 1]
     at = STATE_SIZE * i
     if j == FRAME:
@@ -180,7 +181,7 @@ def relative_motion(elements, p, track, t, speed, state, rotations, turns):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _marker_motion(row, motion):
-    """R m, d and d' of a part from the beginning of its row, m and n."""
+    """Return R m, d and d' of an element from the markers m and n at the beginning of its row."""
     (c0, c1, c2), (px, py, pz), (ux, uy, uz), (ox, oy, oz) = motion
     (mx, my, mz), (nx, ny, nz) = load(row, law.MARKER), load(row, law.REST)
     bx = c0[0] * mx + c1[0] * my + c2[0] * mz
@@ -192,7 +193,7 @@ def _marker_motion(row, motion):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _along(elements, k, motion):
-    """R m, direction, stretch and its rate of the k-th element along one direction."""
+    """Return R m, unit vector, stretch and rate of stretch of the k-th element along one direction."""
     row = elements.directed[k]
     arm, (ex, ey, ez), (vx, vy, vz) = _marker_motion(row, motion)
     nx, ny, nz = load(row, law.AXIS)
@@ -204,14 +205,15 @@ def _along(elements, k, motion):
 
 @jit(allocates=False, forceinline=True)
 def _by_law(elements, k, stretch, speed, inner, press):
-    """What the k-th element's law returns, see `wrcore.forces.law`."""
+    """Return the four results of the law of the k-th element, see `wrcore.forces.law`."""
     return four_at(elements.laws[elements.law[k, law.LAW]], elements, k, stretch, speed, inner, press)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _pressing_force(elements, k, motion):
-    """Force with which another element presses the k-th one along one direction, N: a spring's along z, or that of an
-    element along one direction."""
+    """Return the normal force on the k-th friction element, N.
+
+    This is the force of a spring along z, or of another element along one direction."""
     other = elements.law[k, law.PRESSING_SPRING]
     if other >= 0:
         row = elements.springs[other]
@@ -224,8 +226,10 @@ def _pressing_force(elements, k, motion):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def pair_forces(elements, p, motion, state, inner_at, rate):
-    """Force and moment of a pair's elements on its first body, about its centre and in the second one's axes; what they
-    store (J) and dissipate (W). Writes the rates of internal states, which begin at ``inner_at``."""
+    """Return force and moment of a pair on its first body, stored energy (J) and dissipated power (W).
+
+    The moment is about the centre of the first body; both are in the axes of the second body. The rates of internal
+    states, which begin at ``inner_at``, are written into ``rate``."""
     ((r00, r10, r20), (r01, r11, r21), (r02, r12, r22)), _, _, (ox, oy, oz) = motion
     turning = elements.turning[p]
     fx = fy = fz = 0.0
@@ -273,11 +277,11 @@ def pair_forces(elements, p, motion, state, inner_at, rate):
 
 @jit(allocates=False, fastmath=FUSED)
 def element_forces(elements, track, t, speed, state, rotations, turns, wrenches, rate):
-    """Add the forces of all elements to the ``wrenches`` (n, 6) of the bodies (about centres of mass, track axes) and
-    write the rates of the elements' internal states (m/s) at their places in ``rate``.
+    """Add the forces of all elements to the ``wrenches`` (n, 6) of the bodies, about centres of mass, in track axes.
 
-    ``rotations`` (n + 1, 3, 3) end with the moving frame's; ``turns`` (n, 3) are the angular velocities of the bodies'
-    frames in track axes, rad/s; ``speed`` is the frame's, m/s.
+    Also write the rates of the internal states of elements (m/s) into ``rate``. The last of ``rotations`` (n + 1, 3, 3)
+    is that of the moving frame; ``turns`` (n, 3) are the angular velocities of the bodies' frames in track axes, rad/s;
+    ``speed`` is the speed of the moving frame, m/s.
     """
     inner_at = STATE_SIZE * wrenches.shape[0]
     for p in range(elements.pairs.shape[0]):
@@ -298,9 +302,10 @@ def element_forces(elements, track, t, speed, state, rotations, turns, wrenches,
 
 @jit(allocates=False)
 def element_energies(elements, track, t, speed, state, rotations, turns, rate):
-    """Energy (J) of the springs of all force elements, its rate, the power that dampers and friction dissipate, and
-    that of the moving frame's ends (W); arguments as for `element_forces`. The energy is zero in nominal position,
-    where a preload's spring is not relaxed."""
+    """Return stored energy (J) of all force elements, its rate, dissipated power and power of the moving frame (W).
+
+    The last is the power of the frame at the ends of elements that are fixed to it. The energy is zero in nominal
+    position, also for a preloaded spring. The arguments are those of `element_forces`."""
     inner_at = STATE_SIZE * turns.shape[0]
     stored = storing = lost = driven = 0.0
     for p in range(elements.pairs.shape[0]):

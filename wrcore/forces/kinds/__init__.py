@@ -1,7 +1,7 @@
-"""All kinds of force elements by name: every file beside this one is a kind and holds its `KIND`.
+"""All kinds of force elements by name: each module of this folder describes one kind in its `KIND`.
 
-So is a module that an installed package names as an entry point of the group ``wrcore.elements``; these are looked for
-when a vehicle has a kind of that name.
+Installed packages add kinds: their modules are entry points of the group ``wrcore.elements``. wrcore loads such a
+module when a vehicle has a kind of that name.
 """
 
 from importlib import import_module
@@ -19,15 +19,17 @@ _MODULES = {
 KINDS = {name: module.KIND for name, module in _MODULES.items()}
 
 GROUP = "wrcore.elements"
-"""Of entry points."""
+"""Group of the entry points of kinds in other packages."""
 
 
 _EXPECTED = "expected a module with a KIND as the entry point"
 
 
 def kind_named(name):
-    """The `KIND` of a name, or None; that of another package joins `KINDS` when it is first asked for. An InputError
-    without a source for an entry point that holds no kind."""
+    """Return the `KIND` of a name, or None if there is no such kind.
+
+    A kind of another package is added to `KINDS` at its first use. An InputError without a source is raised for an
+    entry point that holds no kind."""
     if name not in KINDS:
         entry = entry_named(GROUP, name, present_laws().trusted)
         if entry is None:
@@ -52,4 +54,4 @@ SCHEMAS = [
     }
     for name, kind in KINDS.items()
 ]
-"""Of elements by kind: the keys beside those that all have."""
+"""JSON schemas of the kinds: the keys in addition to those of all elements."""

@@ -1,11 +1,11 @@
 """An air spring, on request with a reservoir behind an orifice: a shear_spring and a damper in series with a spring.
 
-Compressed by z, with w the displacement whose volume A w has gone through the orifice, bag and reservoir press by
+Let z be the compression and A w the volume of air that has passed the orifice. The force of bag and reservoir is
 
     F - F0 = K_a z + K_b (z - w),   K_b (z - w) = K_r w + C |w'|^beta sign(w'),
 
 with K_b = n p A^2/V, K_r = n p A^2/V_reservoir (p absolute, n polytropic exponent), K_a = (p - p_atmosphere) dA/dz.
-With s = K_b/(K_b + K_r) and w = s y that is a spring beside a damper in series with another one (Maxwell), exactly:
+With s = K_b/(K_b + K_r) and w = s y this is exactly a spring parallel to a damper and spring in series (Maxwell):
 
     F - F0 = (K_a + s K_r) z + s K_b (z - y),   s K_b (z - y) = s^(1 + beta) C |y'|^beta sign(y').
 
@@ -13,7 +13,7 @@ References
 ----------
 Oda, Nishimura, Vibration of air suspension bogies and their design, Bulletin of JSME 13 (1970) 43-50 (beta = 1).
 Berg, A three-dimensional airspring model with friction and orifice damping, Vehicle System Dynamics 33 supplement
-(1999) 528-539 (beta = 1.8, recalled; its mass of air in the pipe and its friction are left out here).
+(1999) 528-539 (beta = 1.8, recalled; the mass of air in the pipe and the friction of that model are neglected here).
 """
 
 import numpy as np
@@ -22,22 +22,22 @@ from wrcore.forces.kind import AT, Kind, middle_of, number
 from wrcore.forces.kinds import damper, shear_spring, spring_damper
 
 ATMOSPHERE = 101325.0
-"""Pa."""
+"""Atmospheric pressure, Pa."""
 
 FIRST_PRESSURE = 4e5
-"""Above the atmosphere; where the search for the pressure that carries the load begins, Pa."""
+"""Gauge pressure at which the search for the pressure that carries the load starts, Pa."""
 
 SPEEDS = np.concatenate(([0.0], np.geomspace(1e-3, 5.0, 40)))
-"""Of the damper's polygon, m/s: up to 1 mm/s it is linear, beyond its chords are within 1.2 % of the power law."""
+"""Speeds of the damper's polygon, m/s: linear up to 1 mm/s, above with an error below 1.2 % of the power law."""
 
 
 def first_load(item):
-    """Load (N) at `FIRST_PRESSURE`."""
+    """Return the load (N) at `FIRST_PRESSURE`."""
     return FIRST_PRESSURE * item["effective_area"]
 
 
 def parts(item, load):
-    """Spring, bending and, with a reservoir, a damper, at the pressure that carries a load (N)."""
+    """Return spring, bending spring and, with a reservoir, a damper, at the pressure that carries ``load`` (N)."""
     over, area = load / item["effective_area"], item["effective_area"]
     bag = item.get("polytropic_exponent", 1.4) * (over + ATMOSPHERE) * area**2 / item["volume"]
     changing, shear = over * item.get("area_change", 0.0), item.get("shear_stiffness", 0.0)
@@ -57,7 +57,7 @@ def parts(item, load):
 
 
 def check(item):
-    """What belongs to a reservoir."""
+    """Check that the keys of a reservoir are given together."""
     if ("reservoir" in item) != ("orifice_damping" in item):
         yield "", "expected both a reservoir and its orifice_damping, or neither"
     if "orifice_exponent" in item and "reservoir" not in item:

@@ -4,7 +4,7 @@ from wrcore.forces.kind import AT, Kind, Turning, ends_of, number
 
 
 def parts(item):
-    """One part, about x."""
+    """Return one part, spring and damper about x."""
     stiffness, damping = ([value, 0.0, 0.0] for value in (item["stiffness"], item.get("damping", 0.0)))
     return [Turning(ends_of(item), stiffness, damping, anywhere=True)]
 

@@ -1,4 +1,4 @@
-"""Force over displacement along one direction, by a characteristic or by gap and stiffness."""
+"""Force over displacement along one direction, given by a characteristic or by gap and stiffness."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from wrcore.kernels.jit import FUSED, jit
 
 @jit(allocates=False, fastmath=FUSED)
 def displacement(elements, k, stretch, speed, inner, press):
-    """The polygon at x."""
+    """Return the force of a characteristic over displacement, and its stored energy."""
     force, stored = law.characteristic(elements, k, stretch)
     return force, 0.0, stored, 0.0
 
 
 def parts(item):
-    """One part, which may press friction, and carries weight with its steepest slope."""
+    """Return one part. It may act as the normal force of friction; it carries weight with its steepest slope."""
     if "gap" in item:
         gap, free = item["gap"], int(item["gap"] == 0.0)
         points = polygon([0.0, gap, gap + 1.0][free:], [0.0, 0.0, item["stiffness"]][free:])
@@ -27,7 +27,7 @@ def parts(item):
 
 
 def check(item):
-    """One way of saying it."""
+    """Check that either a characteristic or gap and stiffness are given."""
     given = {"characteristic", "gap", "stiffness"} & set(item)
     if given not in ({"characteristic"}, {"gap", "stiffness"}):
         yield "", "expected either a characteristic, or gap and stiffness"

@@ -1,4 +1,4 @@
-"""A spring_damper with cubic parts along and about all three axes."""
+"""A spring_damper with cubic stiffnesses along and about all three axes."""
 
 import numpy as np
 
@@ -15,13 +15,13 @@ KEYS = spring_damper.KEYS | {
 
 @jit(allocates=False, fastmath=FUSED)
 def cubic(elements, k, stretch, speed, inner, press):
-    """h x^3."""
+    """Return the force h x^3 of a cubic spring, and its stored energy h x^4/4."""
     stiffness = law.numbers(elements, k)[0]
     return stiffness * stretch * stretch * stretch, 0.0, 0.25 * stiffness * stretch**4, 0.0
 
 
 def parts(item):
-    """Spring and rotation, and what is cubic along each axis."""
+    """Return translational and rotational spring, and a cubic spring along each axis with a cubic stiffness."""
     along = zip(np.eye(3), item.get("cubic_stiffness", ()), strict=False)
     spring, turning = spring_damper.parts(item)
     return [spring, turning, *(Along(spring.ends, cubic, axis, (value,)) for axis, value in along if value > 0.0)]

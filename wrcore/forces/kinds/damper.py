@@ -1,6 +1,6 @@
-"""A damper along one direction, linear or by a characteristic, or linear along all three axes.
+"""A damper along one direction, linear or with a characteristic, or linear along all three axes.
 
-On request it acts in series with a spring (Maxwell), with the damper's displacement as internal state.
+With ``series_stiffness`` it acts in series with a spring (Maxwell). The internal state is the damper's displacement.
 """
 
 import numpy as np
@@ -11,20 +11,22 @@ from wrcore.forces.kinds.traction_rod import linear
 from wrcore.kernels.jit import FUSED, jit
 
 STEEPEST_INVERSE = 1000.0
-"""A damper in series with a spring needs its speed as a function of its force: where its characteristic is flat, the
-speed rises this many times faster than at its steepest part."""
+"""Largest slope of the inverse characteristic (speed over force), in multiples of its slope at the steepest part.
+
+A damper in series with a spring needs this inverse, which is undefined where the characteristic is flat."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def velocity(elements, k, stretch, speed, inner, press):
-    """The polygon at x'."""
+    """Return the force of a characteristic over speed, and its dissipated power."""
     force = law.characteristic(elements, k, speed)[0]
     return force, 0.0, 0.0, force * speed
 
 
 @jit(allocates=False, fastmath=FUSED)
 def series(elements, k, stretch, speed, inner, press):
-    """k (x - s) behind c s'."""
+    """Return the force k (x - s) = c s' of spring and linear damper in series, with the damper displacement s as
+    state."""
     stiffness, damping = law.numbers(elements, k)[:2]
     force = stiffness * (stretch - inner)
     rate = force / damping
@@ -33,7 +35,7 @@ def series(elements, k, stretch, speed, inner, press):
 
 @jit(allocates=False, fastmath=FUSED)
 def series_velocity(elements, k, stretch, speed, inner, press):
-    """k (x - s) behind the polygon, whose inverse is at hand."""
+    """Return the force k (x - s) of spring and damper in series; the inverse characteristic gives the rate of s."""
     stiffness = law.numbers(elements, k)[0]
     force = stiffness * (stretch - inner)
     rate = law.characteristic(elements, k, force)[0]
@@ -41,7 +43,7 @@ def series_velocity(elements, k, stretch, speed, inner, press):
 
 
 def parts(item):
-    """One part, or one along each axis with damping."""
+    """Return one part, or without a direction one part along each axis with damping."""
     ends, series_stiffness = ends_of(item), item.get("series_stiffness")
     if "direction" not in item:
         values = zip(np.eye(3), item["damping"], series_stiffness or [None] * 3, strict=True)
@@ -62,7 +64,7 @@ def _linear(ends, axis, damping, stiffness):
 
 
 def _inverse(points):
-    """The same points with force as abscissa; flat parts get a small slope."""
+    """Return the points of the inverse characteristic, speed over force; flat parts get a small slope."""
     least = np.max(np.diff(points[:, 1]) / np.diff(points[:, 0])) / STEEPEST_INVERSE
     zero = int(np.argmin(np.abs(points[:, 0])))
     rises = np.maximum(np.diff(points[:, 1]), least * np.diff(points[:, 0]))
@@ -71,7 +73,7 @@ def _inverse(points):
 
 
 def check(item):
-    """Linear or by a characteristic; along one direction, or linear with a value per axis."""
+    """Check that keys fit together: damping or characteristic, one number with a direction or three without."""
     for key in ("damping", "series_stiffness"):
         if key in item and isinstance(item[key], list) == ("direction" in item):
             expected = "one number with a direction" if "direction" in item else "three numbers without a direction"
@@ -89,7 +91,7 @@ def check(item):
 
 
 def _either(one, three_of_them):
-    """Schema of a key with one number, or one for each axis."""
+    """Return the schema of a key that holds one number, or one number for each axis."""
     forms = [number(one), three(three_of_them)]
     return {"description": ", or ".join(form["description"] for form in forms), "anyOf": forms}
 

@@ -1,18 +1,19 @@
-"""Friction along one direction that sticks and slips, whose limit may grow with the force in another element.
+"""Friction along one direction that sticks and slips; its limit may increase with the force in another element.
 
-The limit L is its own plus mu times the force N that presses in another element of the same pair. Two laws hold it,
-both with a displacement as internal state. A *slider* at s behind a stiffness c holds f = c (x - s) and goes along with
-what pulls it from a width w below L on, s' = x' (g - L + w)/w with g = f sign(x'): at L as fast as x, at any speed.
-Where L falls, (|f| - L) sign(f)/(c T) comes on top, T being a millisecond, so that f follows at rest, too. Both parts
-take energy. *Approach* is Fancher's exponential one to the envelope within a distance b, f = L z/b with
-z' = x' - |x'| z/b: without reversal f - L falls by 1/e in b, at any speed. At a constant L it stores L z^2/(2 b) and
-loses L |x'| (z/b)^2. A link of length l that hangs under N adds N x/l.
+The limit L is a constant force plus mu times the normal force N in another element of the same pair of bodies. There
+are two laws, both with a displacement as internal state. *Slider*: a slider at s and a spring of stiffness c in series
+have the force f = c (x - s). From the force L - w on, the slider moves with s' = x' (g - L + w)/w, g = f sign(x'); at g
+= L it is as fast as x, at any speed. If L decreases below |f|, the term (|f| - L) sign(f)/(c T) with T = 1 ms is added
+to s', so that f decreases at rest, too. Both terms dissipate energy. *Approach*: Fancher's exponential approach to the
+limit over a distance b, f = L z/b with z' = x' - |x'| z/b. Without reversal f - L decreases by the factor 1/e over b,
+at any speed. At constant L the stored energy is L z^2/(2 b), the dissipated power L |x'| (z/b)^2. A link of length l
+that hangs under N adds the force N x/l.
 
 References
 ----------
 Fancher, Ervin, MacAdam, Winkler, Measurement and representation of the mechanical properties of truck leaf springs,
 SAE technical paper 800905 (1980): the approach. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14
-(1976) 1675-1682: the same as a differential equation. Iwnicki, Stichel, Orlova, Hecht, Dynamics of railway freight
+(1976) 1675-1682: this law as a differential equation. Iwnicki, Stichel, Orlova, Hecht, Dynamics of railway freight
 vehicles, Vehicle System Dynamics 53 (2015) 995-1033: a spring and a slider in series, both laws for leaf springs and
 links, friction by the load in Lenoir links and wedges.
 """
@@ -24,15 +25,15 @@ from wrcore.forces.kind import AT, DIRECTION, MOST, Along, Kind, axis_of, ends_o
 from wrcore.kernels.jit import FUSED, jit
 
 ROUNDING, FLOOR = 0.02, 1e-3
-"""Width w below a slider's limit: part of the limit, and of that in nominal position (or of 1 N) at least."""
+"""Width w of a slider: `ROUNDING` times the limit, at least `FLOOR` times the larger of nominal limit and 1 N."""
 
 GIVING_WAY = 1e-3
-"""T: time in which a slider at rest gives way where its limit has fallen, s."""
+"""Time constant T with which the force of a slider at rest falls to a decreased limit, s."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def slider(elements, k, stretch, speed, inner, press):
-    """A spring that a slider holds."""
+    """Return force, rate of the slider, stored energy and dissipated power of a spring and slider in series."""
     alone, nominal, pushed, pulled, stiffness, _ = law.numbers(elements, k)
     limit = alone + max(pushed * press, -pulled * press)
     force, width = stiffness * (stretch - inner), max(ROUNDING * limit, FLOOR * max(nominal, 1.0))
@@ -44,8 +45,9 @@ def slider(elements, k, stretch, speed, inner, press):
 
 @jit(allocates=False, fastmath=FUSED)
 def approach(elements, k, stretch, speed, inner, press):
-    """An exponential approach. It stores what it would at the limit of the nominal position; what a limit that varies
-    does counts as dissipated."""
+    """Return force, state rate, stored energy and dissipated power of the exponential approach law.
+
+    The stored energy is that at the nominal limit; the work of a varying limit counts as dissipated."""
     alone, nominal, pushed, pulled, distance, hanging = law.numbers(elements, k)
     limit = alone + max(pushed * press, -pulled * press)
     force, rate = limit * (inner / distance + hanging * stretch), speed - abs(speed) * inner / distance
@@ -55,7 +57,7 @@ def approach(elements, k, stretch, speed, inner, press):
 
 
 def parts(item):
-    """One part that slips, by one of the laws."""
+    """Return one part with the law `approach` or `slider`."""
     mu, alone, slip = item.get("mu", 0.0), item.get("force", 0.0), (item.get("series_stiffness"), 0.0)
     if "approach" in item:
         slip = item["approach"], 1.0 / (mu * item["pendulum"]) if "pendulum" in item else 0.0
@@ -68,7 +70,7 @@ def parts(item):
 
 
 def check(item):
-    """A limit of its own or by another element's force, and one law of slipping."""
+    """Check that the limit is given, by force or by mu and normal, and the data of one of the two laws."""
     if ("mu" in item) != ("normal" in item):
         yield "", "expected both mu and normal, the name of the element that presses, or neither"
     if "force" not in item and "mu" not in item:

@@ -1,8 +1,8 @@
-"""A law of the user's own along one direction: a function that numba compiled, or plain Python, which is slow.
+"""A force law of the user along one direction: a function compiled by numba, or plain Python, which is slow.
 
-``law(stretch, speed, states, parameters, rates)`` gets the stretch (m) and its rate (m/s), the element's own states and
-the parameters, writes the rates of the states, and returns the force against stretch (N), or force, stored energy (J)
-and dissipated power (W). A force alone stores nothing: its power counts as dissipated.
+``law(stretch, speed, states, parameters, rates)`` gets the stretch (m) and its rate (m/s), the states of the element
+and its parameters, and writes the rates of the states. It returns the force against stretch (N), or a tuple of force,
+stored energy (J) and dissipated power (W). If it returns only the force, all its power counts as dissipated.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ TRIED = (0.0, 0.0), (1e-4, 1e-3), (-1e-4, -1e-3)
 
 
 def wrapped(function, note):
-    """The kernel of a function, whose results ``note`` looks at, called as `wrcore.forces.suspension` calls it."""
+    """Return a kernel for `wrcore.forces.suspension` that calls a function and passes its results to ``note``."""
     returned = function.overloads[own.signature_of(2, 3)].signature.return_type
     alone = not isinstance(returned, BaseTuple)
 
@@ -28,7 +28,7 @@ def wrapped(function, note):
         states, parameters, rates = law_arrays(elements, k, state, rate, at)
         given = total(states)
         force = float(function(stretch, speed, states, parameters, rates))
-        if total(states) != given:  # the law wrote to what it may only read
+        if total(states) != given:  # the law wrote into its states, which are read-only
             force = np.nan
         note(stretch + speed + given, force + total(rates))
         return force, 0.0, 0.0, force * speed
@@ -58,20 +58,20 @@ def wrapped(function, note):
 
 
 def address(digest, elements):
-    """Address of the kernel of an own law; ``elements`` an example of the model's."""
+    """Return the address of the kernel of a user's law; ``elements`` is an example of those of the model."""
     state = np.empty(0)
     examples = (elements, 0, 0.0, 0.0, state, state, 0)
     return own.addressed(wrapped, digest, 2, 3, tuple(map(own.Example, examples)), FOUR).address
 
 
 def parts(item):
-    """One part with its own states and parameters."""
+    """Return one part with the states and parameters of the law."""
     numbers, states = item.get("parameters", ()), item.get("states", 0)
     return [Along(ends_of(item), present_laws().find(item["law"]), axis_of(item), numbers, inner=states, odd=False)]
 
 
 def check(item):
-    """The function is there; it is not called."""
+    """Check that the function of the law exists; it is not called."""
     try:
         present_laws().find(item["law"])
     except InputError as error:
@@ -79,7 +79,7 @@ def check(item):
 
 
 def try_law(item):
-    """Call the function of an element for a test; an InputError without a source says what was expected of it."""
+    """Call the function of an element for test values; an InputError without a source states the expectation."""
     function = present_laws().find(item["law"])
     states = item.get("states", 0)
     for pair in TRIED:

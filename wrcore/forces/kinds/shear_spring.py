@@ -1,6 +1,6 @@
-"""A spring_damper half-way between its two ends that bends: an elastic beam.
+"""A spring_damper at the midpoint of its two ends with bending stiffness: an elastic beam.
 
-Its end moments are those of a shear force Q over the height h between its ends and of a bending stiffness,
+The end moments are those of the shear force Q over the height h between the ends and of the bending stiffness,
 Q h/2 +- k_bend (relative rotation).
 """
 
@@ -11,7 +11,7 @@ BENDING = number("a stiffness in N m/rad against relative roll and pitch")
 
 
 def parts(item):
-    """A spring, and what acts against bending."""
+    """Return a spring at the midpoint and a rotational spring against bending."""
     bend, ends = item.get("bending_stiffness", 0.0), middle_of(item)
     spring = Spring(ends, item["stiffness"], item.get("damping", ZERO), item.get("preload"))
     return [spring, Turning(ends, [bend, bend, 0.0])]

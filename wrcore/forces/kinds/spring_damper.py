@@ -14,13 +14,13 @@ ROTATION = ("rotation_stiffness", "rotation_damping", "rotation_cubic_stiffness"
 
 
 def parts(item):
-    """A spring, and what acts against rotation."""
+    """Return a translational and a rotational part."""
     spring = Spring(ends_of(item), item.get("stiffness", ZERO), item.get("damping", ZERO), item.get("preload"))
     return [spring, Turning(spring.ends, *(item.get(key, ZERO) for key in ROTATION), ROTATION)]
 
 
 def acts(keys):
-    """A check that an element has some of these keys."""
+    """Return a check that an element has at least one of these keys except ``at``."""
 
     def check(item):
         if not any(key in item for key in keys if key != "at"):

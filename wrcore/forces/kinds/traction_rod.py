@@ -1,4 +1,4 @@
-"""A spring and a damper along the line between two ends."""
+"""A spring and a damper along the line between the two ends."""
 
 from wrcore.forces import law
 from wrcore.forces.kind import AT, MOST, Along, Kind, ends_of, number
@@ -7,14 +7,14 @@ from wrcore.kernels.jit import FUSED, jit
 
 @jit(allocates=False, fastmath=FUSED)
 def linear(elements, k, stretch, speed, inner, press):
-    """k x + c x', less a preload that pushes."""
+    """Return the force k x + c x' - F0 with the preload F0, which pushes the ends apart."""
     stiffness, damping, preload = law.numbers(elements, k)[:3]
     stored = 0.5 * stiffness * (stretch * stretch) - preload * stretch
     return stiffness * stretch + damping * speed - preload, 0.0, stored, damping * (speed * speed)
 
 
 def parts(item):
-    """One part, which may carry weight."""
+    """Return one part along the line; it may carry weight."""
     stiffness, preload = item["stiffness"], item.get("preload", 0.0)
     numbers = stiffness, item.get("damping", 0.0), preload
     return [Along(ends_of(item), linear, None, numbers, slope=stiffness, preload=preload)]
