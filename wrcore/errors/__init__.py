@@ -1,4 +1,4 @@
-"""The one error that a user can cause, and what it says of a number or a word that cannot be."""
+"""Errors for wrong input, and their messages about invalid numbers and unknown words."""
 
 import re
 from numbers import Real
@@ -6,11 +6,11 @@ from numbers import Real
 _DIGIT = re.compile(r"\d")
 
 _LONGEST = 2000
-"""Letters of a part of a message."""
+"""Largest number of characters of each part of a message."""
 
 
 class InputError(ValueError):
-    """Something a person wrote cannot be used; nothing has been started yet.
+    """Error in input of the user. wrcore raises this error before the computation starts.
 
     Parameters
     ----------
@@ -37,34 +37,36 @@ class InputError(ValueError):
 
     def __init__(self, source, field, expected):
         self.source, self.field, self.expected = str(source), str(field), str(expected)
-        super().__init__(self.source, self.field, self.expected)  # what copies and other processes build it from
+        super().__init__(self.source, self.field, self.expected)  # arguments from which pickle rebuilds the error
 
     def __str__(self):
         return ": ".join(_cut(" ".join(part.split())) for part in self.args if part)
 
 
 def _cut(part):
-    """A part of a message, without the middle of a text of thousands of letters."""
+    """Return a part of a message; of a text that is too long, the middle is left out."""
     return part if len(part) <= _LONGEST else f"{part[: _LONGEST // 2]} ... {part[-_LONGEST // 2 :]}"
 
 
 class UnknownNameError(InputError, KeyError):
-    """A name that something looked up by names does not hold."""
+    """Error for an unknown name, for example of a channel or a body."""
 
 
 def short(value):
-    """A value as an error names it."""
+    """Return a short text of a value for an error message."""
     import reprlib
 
     try:
         return reprlib.repr(value)
-    except Exception:  # whole numbers of thousands of digits, objects that cannot say what they are
+    except Exception:  # integers of thousands of digits, objects whose repr fails
         return f"a {type(value).__name__}"
 
 
 def check_number(value, low, high, source, field, unit=""):
-    """The number, refused if it is none from ``low`` to ``high`` (both allowed, in ``unit``): NaN, text, another unit;
-    ``source`` and ``field`` as for :class:`InputError`.
+    """Return a number as float; raise an InputError unless it is a real number from ``low`` to ``high``.
+
+    Both bounds are allowed; they are in ``unit``. NaN and text are refused. ``source`` and ``field`` are those of
+    :class:`InputError`.
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
         raise InputError(source, field, f"expected {f'{low:g} to {high:g} {unit}'.strip()}, got {short(value)}")
@@ -72,8 +74,10 @@ def check_number(value, low, high, source, field, unit=""):
 
 
 def similar(word, known):
-    """``; did you mean 'speed'?`` where one of the known words is close to a word, or is it but for a unit; else
-    nothing, as of another number of a series: fra_4 is neither fra_5 nor fra_6."""
+    """Return a suggestion such as ``; did you mean 'speed'?`` for an unknown word, or an empty text.
+
+    The suggested word is similar to ``word``, or is ``word`` with a unit. Names of a numbered series are not suggested
+    for each other, for example fra_5 or fra_6 for fra_4."""
     from difflib import get_close_matches
 
     words = {name.lower(): name for name in map(str, known)}
@@ -86,7 +90,7 @@ def similar(word, known):
 
 
 def one_of(known, word):
-    """What to say of a word that is none of the known ones: these, and the closest."""
+    """Return the expectation for an unknown word: the list of known words and the most similar word."""
     known = [str(name) for name in known]
     if not known:
         return f"expected none, as there is nothing of the kind, got {short(word)}"

@@ -1,8 +1,8 @@
-"""A checked front to public functions: their annotations say what an argument may be, `checked` refuses the rest.
+"""Argument checks of public functions: the decorator `checked` refuses values that the annotations do not allow.
 
-An annotation is a type, a union or a list of types, or ``Annotated`` with the marks below. A number of numpy reaches
-the function as Python's own number, all else as it was given. Wrong call shapes (missing or unknown arguments) stay
-Python's own.
+An annotation is a type, a union or a list of types, or ``Annotated`` with the marks below. A number of numpy is
+converted to a number of Python; all other arguments are passed unchanged. Missing or unknown arguments raise the
+TypeError of Python.
 """
 
 import errno
@@ -24,15 +24,15 @@ LARGEST, LEAST = sys.float_info.max, sys.float_info.min
 
 
 class Within(NamedTuple):
-    """Mark: bounds of a number or of those of an array, both allowed; left out: any finite number."""
+    """Mark: bounds of a number or of the numbers of an array, both allowed; without bounds any finite number."""
 
     low: float = -LARGEST
     high: float = LARGEST
     unit: str = ""
     dimensions: int = 32
-    """Of an array, at most."""
+    """Largest number of dimensions of an array."""
     size: int = 1
-    """Of an array, at least."""
+    """Smallest number of elements of an array."""
 
     def __str__(self):
         low = "" if self.low == -LARGEST else "above 0" if self.low == LEAST else f"at least {self.low:g}"
@@ -41,7 +41,7 @@ class Within(NamedTuple):
 
 
 class OneOf(tuple):
-    """Mark: the words that may be given."""
+    """Mark: the allowed words."""
 
 
 ARRAY = {*typing.get_args(ArrayLike)}
@@ -49,19 +49,19 @@ ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
 PLAIN = {float, int, bool, str, type(None)}
-"""Types of arguments that are neither masked nor numpy's."""
+"""Types of arguments that need no check for masked values and no conversion from numpy."""
 
 UNMASKED = "expected numbers without masked ones among them: leave these out (.compressed()) or fill them (.filled())"
-"""What is said of arrays of numpy.ma with masked values: these would count as numbers."""
+"""Message for masked arrays of numpy.ma; their masked values would be used as numbers."""
 
 UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
-"""What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
+"""Error numbers of unusable paths, which become an InputError. A full disk or missing rights remain an OSError."""
 
 Thing = typing.TypeVar("Thing", bound=Callable[..., Any])
 
 
 class Kind(NamedTuple):
-    """What an argument may be: a test, and what to say of it, or all words."""
+    """Allowed values of an argument: a test, a description for messages, and the allowed words if it is one of them."""
 
     fits: Callable[[Any], bool]
     text: str
@@ -69,8 +69,10 @@ class Kind(NamedTuple):
 
 
 def checked(thing: Thing) -> Thing:
-    """Decorate a function, or a class for what it is made of: an argument that its annotation excludes is an
-    `InputError` of one line. Annotations are read at the first call; a class stays itself.
+    """Decorate a function, or the constructor of a class, with a check of its arguments.
+
+    An argument that its annotation does not allow raises an `InputError` of one line. Annotations are evaluated at the
+    first call. A decorated class remains the same class.
     """
     if isinstance(thing, type):
         setattr(thing, "__init__", checked(thing.__init__))  # noqa: B010
@@ -115,12 +117,12 @@ def checked(thing: Thing) -> Thing:
 
 
 def _plain(value):
-    """A number or a text of numpy as Python's own: its arithmetic would have fewer digits, or another range."""
+    """Return a number or text of numpy as a type of Python, whose numbers have full precision and range."""
     return value.item() if isinstance(value, np.generic) else value
 
 
 def is_masked(value, depth=4):
-    """Whether an array, or one in a list of lists to a ``depth``, has masked values."""
+    """Whether an array, or an array in nested lists up to ``depth`` levels, has masked values."""
     if isinstance(value, list | tuple):
         inner = [item for item in value if isinstance(item, np.ma.MaskedArray | list | tuple)] if depth else []
         return any(is_masked(item, depth - 1) for item in inner)
@@ -128,7 +130,7 @@ def is_masked(value, depth=4):
 
 
 def same_shape(source, **arrays):
-    """Refuse arrays, by the names of their arguments, that do not broadcast."""
+    """Return arrays broadcast to one shape; an InputError names the arguments if this is impossible."""
     try:
         return np.broadcast_arrays(*arrays.values())
     except ValueError:
@@ -137,7 +139,7 @@ def same_shape(source, **arrays):
 
 
 def kind_of(annotation, *marks):
-    """The `Kind` of an annotation; a text among the marks of ``Annotated`` says what is expected."""
+    """Return the `Kind` of an annotation; a text among the marks of ``Annotated`` is the description for messages."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         return kind_of(inner[0], *inner[1:], *marks)
@@ -176,7 +178,7 @@ def _plain_kind(kind, bounds):
     if kind in (float, int):
         numbers = (int, np.integer) if kind is int else (float, int, np.floating, np.integer)
 
-        def fits(v):  # numbers of fewer bits would compare with bounds of their own size
+        def fits(v):  # a float32 would be compared with bounds rounded to float32
             v = float(v) if isinstance(v, np.floating) else v
             return isinstance(v, numbers) and v is not True and v is not False and low <= v <= high
 
@@ -195,13 +197,13 @@ def _plain_kind(kind, bounds):
 
 
 def _is_text(value):
-    """Whether a file system and a file could hold a text or a path."""
+    """Whether a text or path has only characters that files and file names can hold."""
     text = fspath(value)
     return isinstance(text, str) and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
 
 
 def _all_fit(value, fits, one_shot, least):
-    """Whether all items of a list fit; what can be read only once is left to the function."""
+    """Whether all items of a list fit; an iterator, which can be read only once, is not checked."""
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         return False
     if hasattr(value, "__next__"):
@@ -221,5 +223,5 @@ def _are_numbers(value, bounds):
         return False
     if array.dtype.kind not in "iuf" or array.size < bounds.size or array.ndim > bounds.dimensions:
         return False
-    array = array.astype(float, copy=False)  # numbers of fewer bits would compare with bounds of their own size
+    array = array.astype(float, copy=False)  # a float32 would be compared with bounds rounded to float32
     return bool(((array >= bounds.low) & (array <= bounds.high)).all())

@@ -1,7 +1,7 @@
-"""HDF5 files that hold what was written to them: a digest before HDF5's library sees them, then what they are made of.
+"""HDF5 files with a digest: wrcore checks the digest and the structure of a file before it reads the data.
 
-The first `BLOCK` bytes, which HDF5 leaves to its users, hold the SHA-256 of all bytes that follow. A file without it
-(an older one) is read, too, where the reader takes such files; what it holds may then be damaged.
+The first `BLOCK` bytes, the user block of HDF5, hold the SHA-256 of all following bytes. Some readers also accept a
+file without a digest (of an older version); damage of such a file may remain undetected.
 """
 
 import hashlib
@@ -22,14 +22,15 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAD = b"HDF5 with SHA-256 of all that follows byte 512: "
 
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-MOST_DEFLATED = 1100  # bytes that one stored byte stands for at most: deflate reaches 1032
+MOST_DEFLATED = 1100  # largest ratio of data to stored bytes; deflate reaches 1032
 LARGEST_CHUNK = 2**26  # bytes
 
 
 @contextmanager
 def new_hdf5(path: str | os.PathLike[str], **options: bool) -> Iterator[h5py.File]:
-    """A new HDF5 file (:class:`h5py.File` with options) with its digest, which appears when it is complete; its name
-    says what it is."""
+    """Create an HDF5 file (:class:`h5py.File` with options) with a digest; it appears under its name when complete.
+
+    An InputError is raised if the name does not end as an HDF5 file does."""
     named(path, HDF5, "file")
     with appearing(path) as whole:
         patient = _Patient(whole.raw)
@@ -43,7 +44,7 @@ def new_hdf5(path: str | os.PathLike[str], **options: bool) -> Iterator[h5py.Fil
 
 
 class _Patient:
-    """A file that takes all that HDF5 writes, and keeps the first fault: the library crashes where closing fails."""
+    """A file that accepts all writes of HDF5 and stores the first error: HDF5 crashes if closing a file fails."""
 
     def __init__(self, file):
         self.file, self.fault = file, None
@@ -65,7 +66,7 @@ class _Patient:
         self._tried(self.file.truncate, size)
 
     def flush(self):
-        """Nothing is held back."""
+        """Do nothing, as writes are not buffered."""
 
 
 def _digest(file):
@@ -80,16 +81,18 @@ def _sign(file):
 
 
 def sign(path: str | os.PathLike[str]) -> None:
-    """State the digest of a file anew, after an edit on purpose."""
+    """Write the digest of a file again, after an intended edit of the file."""
     with open(path, "r+b") as file:
         _sign(file)
 
 
 @contextmanager
 def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[h5py.File]:
-    """Open an HDF5 file of ours for reading; whatever is wrong with it or comes up while it is read is an `InputError`
-    of one line that names the ``kind`` it should be. Its content agrees with the digest at its head, all its links lead
-    to itself, and its datasets hold numbers or text, all of them stored in the file.
+    """Open an HDF5 file of wrcore for reading, after a check of its content.
+
+    The content must agree with the digest, all links must lead to the file itself, and all datasets must hold numbers
+    or text that are stored in the file. Any error, also while the file is read, is an `InputError` of one line that
+    names the expected ``kind`` of file.
     """
     try:
         _check_bytes(path)
@@ -105,7 +108,7 @@ def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[h5py.File]
 
 
 def foreign(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is HDF5 without a digest at its head, by its first bytes: the library would have to trust it."""
+    """Whether a file is HDF5 without a digest of wrcore, so that its content cannot be verified."""
     try:
         check_regular(path)
         with open(path, "rb") as file:
@@ -115,7 +118,7 @@ def foreign(path: str | os.PathLike[str]) -> bool:
 
 
 def _check_bytes(path):
-    """ValueError where a file does not agree with the digest at its head."""
+    """Raise a ValueError if a file does not agree with the digest in its first bytes."""
     check_regular(path)
     with open(path, "rb") as file:
         head = file.read(BLOCK)
@@ -128,7 +131,7 @@ def _check_bytes(path):
 
 
 def _check_content(file, size):
-    """ValueError where reading would leave the file, or read more than it holds."""
+    """Raise a ValueError if links lead out of a file, or if its data are larger than the file can hold."""
     foreign, items, stored = [], [], 0
     file.visititems_links(lambda name, link: foreign.append(name) if not isinstance(link, h5py.HardLink) else None)
     if foreign:
@@ -147,7 +150,7 @@ def _check_content(file, size):
 
 
 def _fault(dataset):
-    """What keeps a dataset from being read; empty if nothing does. What it is stored as comes first."""
+    """Return the reason why a dataset is refused, or an empty text. The storage layout is checked first."""
     made = dataset.get_create_plist()
     layout = made.get_layout()
     if layout not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED) or made.get_external_count():

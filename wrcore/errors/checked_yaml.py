@@ -1,4 +1,4 @@
-"""YAML files read strictly: one clear line for whatever is wrong, before any work starts."""
+"""Strict reading of YAML files: each fault is reported in one line before a computation starts."""
 
 import copy
 import hashlib
@@ -19,14 +19,14 @@ from wrcore.errors import InputError, similar
 from wrcore.errors.input_files import check_regular
 
 MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
-"""A longer document, one with more values, or nested deeper, is none that a person wrote."""
+"""Limits of a document: size (bytes), number of values, levels of nesting. Files written by hand are far smaller."""
 
 _FORMATS = (
     "fqdn", "idna", "isoduration", "jsonpointer", "rfc3339_validator", "rfc3986_validator", "rfc3987", "rfc3987_syntax",
     "uri_template", "webcolors",
 )  # fmt: skip
-"""Modules that jsonschema would import where they are, as beside JupyterLab, in up to a second; all for formats that
-no schema here has."""
+"""Optional modules for formats that no schema of wrcore uses. If they are installed, for example with JupyterLab,
+jsonschema would import them, which takes up to 1 s."""
 
 _TAG = "tag:yaml.org,2002:"
 _LIBYAML = yaml.__with_libyaml__
@@ -34,7 +34,7 @@ _LIBYAML = yaml.__with_libyaml__
 
 @cache
 def _validator():
-    """The class of jsonschema's validators, without those formats."""
+    """Return the validator class of jsonschema, imported without the modules of `_FORMATS`."""
     hidden = [name for name in _FORMATS if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     try:
@@ -46,10 +46,10 @@ def _validator():
 
 
 class _Loader(yaml.CSafeLoader if _LIBYAML else yaml.SafeLoader):
-    """Safe loader that refuses repeated keys and takes for a number only what everybody reads as the same one.
+    """Safe loader that refuses repeated keys and reads only unambiguous decimal numbers as numbers.
 
-    1e6, 1E-6 and 1.0E6 are numbers; 60E1 and 54E1 are rails; 020 (octal in YAML 1.1), 1:30 (base 60), 1_000, 0x10 and
-    dates stay text.
+    1e6, 1E-6 and 1.0E6 are numbers. The names of rails 60E1 and 54E1 are text, as are 020 (octal in YAML 1.1), 1:30
+    (base 60), 1_000, 0x10 and dates.
     """
 
     yaml_implicit_resolvers = {
@@ -71,7 +71,7 @@ for _name, _pattern in _NUMBERS.items():
 def _mapping(loader, node, deep=False):
     seen = set()
     for key, _ in node.value:
-        if key.tag != f"{_TAG}merge":  # the keys of << *anchor give way to those written beside it
+        if key.tag != f"{_TAG}merge":  # explicit keys override those of << *anchor
             name = loader.construct_object(key, deep=True)
             if name in seen:
                 raise yaml.constructor.ConstructorError(None, None, f"the key {name!r} is given twice", node.start_mark)
@@ -83,8 +83,10 @@ _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping
 
 
 def _load(text):
-    """The document, after a look at its events: the parser would follow any depth, and aliases, wherever they lead."""
-    sizes, above, size = {}, [], 0  # values that an anchor stands for, and of the collections around the present one
+    """Return the document of a YAML text, after a check of nesting depth and number of values, aliases included.
+
+    PyYAML itself limits neither the depth nor the size of aliases."""
+    sizes, above, size = {}, [], 0  # number of values by anchor, and of each open collection
     for event in yaml.parse(text, Loader=yaml.CSafeLoader if _LIBYAML else yaml.SafeLoader):
         if isinstance(event, yaml.CollectionStartEvent):
             above.append((event.anchor, size))
@@ -107,7 +109,7 @@ _LIMITS = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and non
 
 
 def read_yaml(path):
-    """Read one YAML mapping; InputError if it is missing, not UTF-8, not YAML, repeats a key or is no mapping."""
+    """Read one YAML mapping; an InputError is raised for a missing file, wrong UTF-8 or YAML, and repeated keys."""
     text = ""
     try:
         check_regular(path)
@@ -122,7 +124,7 @@ def read_yaml(path):
         raise InputError(path, "", f"expected a readable file: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "expected a UTF-8 text file") from None
-    except Exception as error:  # besides its own errors, PyYAML lets through whatever its constructors stumble over
+    except Exception as error:  # PyYAML also raises other errors in its constructors
         mark = getattr(error, "problem_mark", None)
         where, problem = f"line {mark.line + 1}" if mark else "", getattr(error, "problem", None) or error
         if mark and "\t" in "".join(text.splitlines()[mark.line : mark.line + 1]):
@@ -134,14 +136,14 @@ def read_yaml(path):
 
 
 def read_source(source, kind):
-    """Name for errors, folder that paths count from, and content of a file, or of a mapping in its place."""
+    """Return name for messages, folder of relative paths, and content of a YAML file or of a mapping."""
     if isinstance(source, Mapping):
         return kind, Path(), plain_tree(dict(source), kind)
     return str(source), Path(source).parent, read_yaml(source)
 
 
 def parse_value(text):
-    """One value as written on a command line (``--set key=value``), by YAML's rules."""
+    """Return the value of a text of the command line (``--set key=value``), read as YAML."""
     try:
         return _load(text)
     except Exception:  # as in read_yaml
@@ -149,7 +151,7 @@ def parse_value(text):
 
 
 def parse_ratio(value):
-    """A number, or a ratio of two such as '1/40', as float; NaN where the value is no such thing."""
+    """Return a number, or a ratio of two numbers such as '1/40', as float; NaN for any other value."""
     numerator, slash, denominator = str(value).partition("/")
     try:
         return float(numerator) / (float(denominator) if slash else 1.0)
@@ -159,22 +161,24 @@ def parse_ratio(value):
 
 @cache
 def _schema(name):
-    """A schema of the package, parsed once: a sweep validates as many scenes as it has runs."""
+    """Return a schema of the package. It is parsed only once, because a sweep validates a scene for each run."""
     text = files("wrcore").joinpath("scene", "schemas", f"{name}.yaml").read_text(encoding="utf-8")
     return yaml.load(text, Loader=_Loader)  # reads 1.0e9 as a number
 
 
 def keys_of(schema_name):
-    """Keys of a schema, for help pages: path (``*`` stands for any name, ``[]`` for the items of a list), description,
-    whether what is above cannot do without, default (None: none) and unit of a number (``1``: pure; empty: no number).
+    """Yield the keys of a schema for help pages: path, description, whether required, default and unit.
+
+    In a path ``*`` stands for any name, ``[]`` for the items of a list. The default is None if there is none. The unit
+    is ``1`` for a number without unit, empty for other values.
     """
     return _keys(_schema(schema_name), "")
 
 
 def unit_of_key(path):
-    """Unit of a scene's key such as ``initial.bodies.car.y``, empty where it holds no number or there is none."""
+    """Return the unit of a key of a scene, such as ``initial.bodies.car.y``; empty if it is unknown or no number."""
     inside, group, _, *keys = [*path.split("."), "", ""]
-    if inside == "vehicle" and keys[2:]:  # a change of its bodies, elements or joints
+    if inside == "vehicle" and keys[2:]:  # a change of bodies, elements or joints of the vehicle
         ends = ".".join(keys[:-2]), keys[0]
         names = {f"{group}{one}.{end}" for one in (".*", "[]") for end in ends}
         known = {unit for name, *_, unit in keys_of("vehicle") if unit and name in names}
@@ -193,7 +197,7 @@ _IN_UNIT = re.compile(rf"\bin ((?:1/)?{_UNIT}(?:[ /]{_UNIT})*)(?![\w^])")
 
 
 def _unit(part):
-    """What a schema says: ``x-unit``, or the first "in UNIT" of a description."""
+    """Return the unit that a schema states: ``x-unit``, or the first "in UNIT" of the description."""
     found = _IN_UNIT.search(part.get("description", ""))
     return str(part.get("x-unit") or found and found[1] or "") if _holds_numbers(part) else ""
 
@@ -221,13 +225,14 @@ def _keys(part, path):
 
 
 def kinds_in(part):
-    """Schemas of the kinds of things that a part of a schema may be, if it names a module that knows them."""
+    """Return the schemas of all kinds of a schema's part, from the module named by ``x-kinds``; empty without it."""
     return import_module(part["x-kinds"]).SCHEMAS if "x-kinds" in part else ()
 
 
 def validate(data, schema_name, source):
-    """A copy of the data with all defaults, checked against a schema of the package; InputError in one line names the
-    source, the field and what was expected. Whole numbers are integers where the schema asks for them.
+    """Check data against a schema of the package and return a copy with all defaults.
+
+    Integers of the schema are converted to int. An InputError of one line names source, field and expectation.
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
@@ -239,12 +244,13 @@ def validate(data, schema_name, source):
 _SOUND: dict[tuple[int, bytes], dict] = {}
 
 MOST_SOUND = 10_000
-"""Data that are remembered to be sound."""
+"""Largest number of data sets stored as valid in `_SOUND`."""
 
 
 def check(data, schema, source, above=""):
-    """Raise an InputError where data are not what a schema (a dict) asks for; ``above``: the field that holds them.
-    Nothing is checked twice against the same schema."""
+    """Raise an InputError if data do not match a schema (a dict); ``above`` is the field that holds the data.
+
+    Data that are known to be valid for this schema are not checked again."""
     known = id(schema), hashlib.sha256(repr(data).encode(errors="surrogatepass")).digest()
     if known in _SOUND:
         return
@@ -255,13 +261,14 @@ def check(data, schema, source, above=""):
         raise InputError(source, ".".join(filter(None, [above, field])), expected)
     if len(_SOUND) >= MOST_SOUND:
         _SOUND.clear()
-    _SOUND[known] = schema  # which lives as long as its id is known
+    _SOUND[known] = schema  # keeps the schema alive, so that its id stays unique
 
 
 def plain_tree(data, source):
-    """A copy of nested data that holds nothing but what JSON knows, paths and functions as text; InputError for keys
-    that are no text, dates, bytes, sets, numbers not finite or too large, text that is no Unicode, data that contain
-    themselves or that aliases blow up beyond `MOST_VALUES`.
+    """Return a copy of nested data with types of JSON only; paths and functions become text.
+
+    An InputError is raised for keys that are not text, dates, bytes, sets, numbers that are infinite, NaN or too large,
+    text that is not Unicode, data that contain themselves, and data with more than `MOST_VALUES` values.
     """
     left = MOST_VALUES
 
@@ -292,11 +299,11 @@ def plain_tree(data, source):
 
 
 GIVEN: dict[str, Callable] = {}
-"""Functions that stood in data of a Python program, by their `name_of_function`."""
+"""Functions that a Python program passed in data, by their `name_of_function`."""
 
 
 def name_of_function(value):
-    """``module:function`` of a function, compiled ones too, that a module knows by its name; else empty."""
+    """Return ``module:function`` for a plain or compiled function and store it in `GIVEN`; else an empty text."""
     plain = getattr(value, "py_func", value)
     name = getattr(plain, "__qualname__", "") if callable(plain) and not isinstance(plain, type) else ""
     if not name.isidentifier():
@@ -306,7 +313,7 @@ def name_of_function(value):
 
 
 def _fault(value):
-    """What is wrong with a single value; empty if JSON knows it."""
+    """Return the fault of a single value; empty if the value is valid in JSON."""
     if isinstance(value, bool) or value is None:
         return ""
     if isinstance(value, int):
@@ -320,7 +327,7 @@ def _fault(value):
 
 
 def _explain(error, schema):
-    """Field and expectation of a validation error, from the schema's own descriptions."""
+    """Return field and expectation of a validation error, from the descriptions in the schema."""
     field = ".".join(str(part) for part in error.absolute_path)
     if error.validator == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
@@ -333,7 +340,7 @@ def _explain(error, schema):
         text = error.schema["properties"].get(missing[0], {}).get("description", "a value")
         return field, f"expected {text}, but the key is missing"
     root, description = schema, schema.get("description", "a valid value")
-    for part in error.absolute_schema_path:  # the innermost description on the way to what failed
+    for part in error.absolute_schema_path:  # the innermost description on the path to the failed rule
         if part not in schema:  # jsonschema leaves out "$ref"
             schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
             description = schema.get("description", description)
@@ -351,7 +358,7 @@ _BOUNDS = {
 
 
 def _bound(error, description):
-    """The bound of a schema that a number or the length of a list exceeds, where the description leaves it out."""
+    """Return the bound that a number or the length of a list violates, unless the description states this bound."""
     said = {float(number) for number in _NUMBER.findall(description)} | ({0.0} if "negative" in description else set())
     value = error.validator_value
     if error.validator not in _BOUNDS or {float(value), abs(float(value))} & said:

@@ -1,10 +1,10 @@
-"""Files of columns: one reader for profiles, track irregularity, poses, creep cases, shapes of wheels and slices.
+"""Reader of text files with columns, for profiles, irregularity, positions, creep cases, shapes of wheels and slices.
 
-Commas, semicolons, tabs or blanks separate columns; the header, else all lines together, say which. A comma is a
-decimal mark where it does not separate: beside semicolons and tabs, between blanks, in quotes. A header names columns
-with their units: ``y_mm``, ``y [mm]``, ``y (mm)``, ``y/mm``, ``y in mm``, or names in one line and units in the next
-one. ``#`` starts a comment, as do ``%`` and ``!`` after a blank or at the beginning of a line. Files are UTF-8, UTF-16
-with a byte order mark, or Latin-1.
+Commas, semicolons, tabs or blanks separate columns; the separator is found from the header, else from all lines. A
+comma is a decimal mark if another character separates: with semicolons, tabs or blanks, and in quotes. A header names
+columns with their units: ``y_mm``, ``y [mm]``, ``y (mm)``, ``y/mm``, ``y in mm``, or names in one line and units in the
+next one. ``#`` starts a comment, as do ``%`` and ``!`` after a blank or at the beginning of a line. Files are UTF-8,
+UTF-16 with a byte order mark, or Latin-1.
 """
 
 import math
@@ -17,7 +17,7 @@ from wrcore.errors import InputError
 from wrcore.errors.input_files import check_regular
 
 NO_NUMBER = "", "NA", "N/A", "n/a", "NaN", "nan", "NAN", "null", "NULL", "None"
-"""What stands for a number that is not there."""
+"""Texts of cells without a number."""
 
 _PREFIXED = {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "inch": 0.0254, "in": 0.0254}
 UNITS = {
@@ -29,7 +29,7 @@ UNITS = {
     "N": {"n": 1.0, "kn": 1e3},
     "Pa": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9},
 }
-"""Factors to the SI unit of each quantity, by units in small letters."""
+"""Factors to the SI unit of each quantity, by units in lower case."""
 
 _ALL_UNITS = sorted({unit for units in UNITS.values() for unit in units}, key=len, reverse=True)
 _NO_UNIT = "", "-", "1"
@@ -42,23 +42,24 @@ _DECIMAL_COMMAS = "; decimal commas are read beside semicolons, tabs or blanks, 
 
 
 class ColumnFile(NamedTuple):
-    """Cells of a file of columns, as text."""
+    """Cells of a file with columns, as text."""
 
     path: str
     names: tuple[str, ...]
-    """As the header has them; empty without a header."""
+    """Names of columns as in the header; empty without a header."""
     header: tuple
-    """Its line number and text."""
+    """Line number and text of the header."""
     cells: list
-    """A list of text per row."""
+    """List of cells for each row."""
     lines: list
     """Line number of each row."""
     texts: list
-    """Each row as it stands in the file."""
+    """Text of each row as in the file."""
 
     def numbers(self, columns, factors=None, empty=False, expected=""):
-        """Numbers (rows, len(columns)) of columns times ``factors``; InputError names the line of a cell that is none,
-        or that is ``empty`` unless this is allowed: then it is NaN."""
+        """Return the numbers (rows, len(columns)) of columns, times ``factors``.
+
+        An InputError names the line of a cell that is not a number. If ``empty``, cells without a number are NaN."""
         table = np.empty((len(self.cells), len(columns)))
         commas = points = None
         for row, cells in enumerate(self.cells):
@@ -71,14 +72,14 @@ class ColumnFile(NamedTuple):
                         raise self.fault(row, len(columns), expected) from None
                     table[row, k] = math.nan
                 commas = (cell, row) if "," in cell else commas
-                points = cell if "." in cell and cell in self.texts[row] else points  # not one put there by a reader
+                points = cell if "." in cell and cell in self.texts[row] else points  # not a point from a reader
         if commas and points:
             expected = f"expected one decimal mark in a file, got {commas[0]} and {points}"
             raise InputError(self.path, f"line {self.lines[commas[1]]}", expected)
         return table if factors is None else table * np.asarray(factors)
 
     def fault(self, row, count, expected=""):
-        """InputError of a row that does not hold ``count`` numbers, or what is ``expected``."""
+        """Return an InputError for a row that does not hold ``count`` numbers, or the content ``expected``."""
         text = self.texts[row]
         count = max(count, len(self.names))
         many = expected or {1: "a number", 2: "two numbers"}.get(count, f"{count} numbers")
@@ -87,7 +88,7 @@ class ColumnFile(NamedTuple):
 
 
 def number(text):
-    """The number that a cell holds; ValueError where it holds none."""
+    """Return the number of a cell; raise a ValueError if it is not a number."""
     try:
         if "_" not in text:
             return float(text)
@@ -100,7 +101,7 @@ def number(text):
 
 
 def read_text(path, what="a CSV file with a header line"):
-    """Text of a regular file, without its byte order mark; InputError where it cannot be read."""
+    """Return the text of a regular file without its byte order mark; raise an InputError if it cannot be read."""
     try:
         check_regular(path)
         with open(path, "rb") as file:
@@ -117,10 +118,10 @@ def read_text(path, what="a CSV file with a header line"):
 
 
 def read_column_file(path, rows=None, header=True):
-    """`ColumnFile` of a file, or of its ``rows`` (line number, text) without comments.
+    """Return the `ColumnFile` of a file, or of its ``rows`` (line number, text) without comments.
 
-    ``header`` True: the first line is one; False: it is where it holds a word that is no number, and lines
-    ``Name=value`` before it are left out; None: there is none, and rows may have remarks at their ends."""
+    ``header`` True: the first line is the header. False: the first line is the header if it holds a word that is not a
+    number; lines ``Name=value`` before it are skipped. None: there is no header, and rows may end with remarks."""
     comments = ()
     if rows is None:
         rows, comments = _rows(read_text(path))
@@ -153,17 +154,17 @@ def read_column_file(path, rows=None, header=True):
 
 
 def _take_header(rows, comments, header):
-    """Line number and text of the header, which is taken out of the rows; 0 and nothing where there is none."""
+    """Return line number and text of the header and remove it from the rows; 0 and empty text without a header."""
     if rows and header is not None and _is_header(rows[0][1]):
         return rows.pop(0)
     above = [row for row in comments if rows and row[0] < rows[0][0]]
-    if above and _units_in(above[-1][1]) and _fits(above[-1][1], rows):  # as NumPy and MATLAB write it: a comment
+    if above and _units_in(above[-1][1]) and _fits(above[-1][1], rows):  # NumPy and MATLAB write it as a comment
         return above[-1]
     return rows.pop(0) if rows and header else (0, "")
 
 
 def _check_counts(file, header):
-    """Refuse rows with more cells than others, or, unless the file must have a header, with fewer."""
+    """Raise an InputError for rows with too many cells, or, unless the file must have a header, with too few cells."""
     count = len(file.names) or len(file.cells[0] if file.cells else ())
     for row, cells in enumerate(file.cells):
         if len(cells) > count or (len(cells) < count and not header):
@@ -176,7 +177,7 @@ def _check_counts(file, header):
 
 
 def header_of(path):
-    """Names in the header of a file, in any of the ways in which they are separated; none where it cannot be read."""
+    """Return a `ColumnFile` with only the names in the header of a file; without names if it cannot be read."""
     try:
         rows, _ = _rows(read_text(path))
     except InputError:
@@ -186,10 +187,10 @@ def header_of(path):
 
 
 def read_table(path, text="", known=()):
-    """Table (pandas.DataFrame) of a file of columns with a header line; the column ``text`` stays text, NA, too.
+    """Read a file of columns with a header line into a table (pandas.DataFrame).
 
-    Columns that are ``known`` by their SI names may have other units, and are converted. Columns with a cell that is
-    neither a number nor empty stay text."""
+    Columns whose SI names are ``known`` may have other units; they are converted to SI units. The column ``text`` is
+    not converted to numbers. Columns with a cell that is neither a number nor empty also remain text."""
     import pandas as pd
 
     file = read_column_file(path)
@@ -207,7 +208,7 @@ def read_table(path, text="", known=()):
 
 
 def _column(file, k, factor, cells):
-    """Numbers of a column, or its cells where one is no number."""
+    """Return the numbers of a column, or its cells as text if a cell is not a number."""
     try:
         return file.numbers([k], [factor], empty=True)[:, 0]
     except InputError as error:
@@ -217,11 +218,11 @@ def _column(file, k, factor, cells):
 
 
 def named_columns(file, known, aliases=None):
-    """Known names of a file's columns and factors to their SI units, (name, factor) by the column's index; columns of
-    other names are left out.
+    """Return the known name of each column and the factor to its SI unit, (name, factor) by index of the column.
 
-    ``known`` are names with SI units, such as ``level_m``; ``aliases`` are other names of them, both without units.
-    InputError names a known column that has no unit, or one of another quantity."""
+    ``known`` are names with SI units, such as ``level_m``; ``aliases`` maps other names to them, both without units.
+    Columns with other names are left out. An InputError names a known column without a unit, or with a unit of another
+    quantity."""
     bases = {split_unit(name)[0]: (name, split_unit(name)[1]) for name in known}
     found = {}
     for k, name in enumerate(file.names):
@@ -243,7 +244,7 @@ def named_columns(file, known, aliases=None):
 
 
 def split_unit(name):
-    """Name of a column, in small letters and with underscores, and its unit, empty where it states none."""
+    """Return the name of a column, in lower case with underscores, and its unit, empty without a unit."""
     name = name.strip().strip('"').strip()
     bracket = re.fullmatch(r"(.*?)[\s,_]*[\[(]\s*([^\])]*?)\s*[\])]", name)
     match = bracket
@@ -262,12 +263,12 @@ def _plain(name):
 
 
 def _si_case(unit):
-    """A unit as `UNITS` writes SI units, else as it is."""
+    """Return a unit as `UNITS` writes SI units, or unchanged if it is not one of them."""
     return next((quantity for quantity in UNITS if quantity.lower() == unit.lower()), unit)
 
 
 def _rows(text):
-    """Lines that hold cells, and those that are comments, with their numbers."""
+    """Return the lines with cells, and the comment lines, each with line number and text."""
     rows, comments = [], []
     for k, line in enumerate(text.splitlines(), 1):
         line = _SINGLE.sub(r'"\1"', line) if "'" in line else line
@@ -282,7 +283,7 @@ def _rows(text):
 
 
 def _is_header(line):
-    """Whether a line has words that are no numbers."""
+    """Whether a line has words that are not numbers."""
     words = [word for word in re.split(r'[\s,;"]+', line) if word]
     return any(re.search(r"[^\W\d_]", word) and not _is_number(word) for word in words)
 
@@ -306,7 +307,7 @@ def _fits(head, rows):
 
 
 def _are_units(cells, count):
-    """Whether a row is one of units."""
+    """Whether a row holds only units."""
     units = {cell.strip("[]() ").lower() for cell in cells} - set(_NO_UNIT)
     return len(cells) == count and bool(units) and units <= set(_ALL_UNITS)
 
@@ -316,12 +317,12 @@ def _bare(lines):
 
 
 def _separator(lines, header="", default=None):
-    """What separates the cells of lines: ",", ";", tab, " " or ", " (commas and blanks)."""
+    """Return the separator of cells in lines: ",", ";", tab, " " or ", " (commas and blanks)."""
     lines, header = _bare(lines), _bare([header])[0]
     joined = "\n".join(lines)
     if default and default.strip(" ") and default in header:
         return default
-    for separator in (";", "\t", ","):  # the header's, where it is used
+    for separator in (";", "\t", ","):  # the separator of the header, if rows use it
         if separator in header.replace(",\t", ",") and separator in joined.replace(",\t", ","):
             return separator
     if ";" in joined:
@@ -334,13 +335,13 @@ def _separator(lines, header="", default=None):
 
 
 def _decimal_commas(line):
-    """Whether a line has two or more numbers between blanks, commas in them or none."""
+    """Whether a line consists of two or more numbers separated by blanks, with or without decimal commas."""
     words = line.split()
     return len(words) > 1 and all(map(_COMMA_NUMBER.fullmatch, words))
 
 
 def _split(line, separator):
-    """Cells of a line, without quotes and blanks around them."""
+    """Return the cells of a line, without quotes and surrounding blanks."""
     if separator == " ":
         return [word.strip('"').strip() for word in _WORD.findall(line.strip(" ,"))]
     if separator == ", ":
@@ -353,7 +354,7 @@ def _split(line, separator):
 
 
 def _evened(rows, count, separator):
-    """Rows without empty cells that end or begin all of them, and with one tab for several."""
+    """Return rows of equal length: without empty cells at all beginnings or ends, repeated tabs merged."""
     if separator == "\t" and len({len(row) for row in rows} | ({count} if count else set())) > 1:
         joined = [[cell for k, cell in enumerate(row) if cell or k == len(row) - 1] for row in rows]
         if len({len(row) for row in joined} | ({count} if count else set())) == 1:
@@ -368,5 +369,5 @@ def _evened(rows, count, separator):
 
 
 def _n_empty(row):
-    """Number of empty cells at the end of a row."""
+    """Return the number of empty cells at the end of a row."""
     return next((k for k, cell in enumerate(reversed(row)) if cell), len(row))

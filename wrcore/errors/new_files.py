@@ -1,4 +1,4 @@
-"""Files that appear under their name when they are complete, whatever happens on the way."""
+"""Output files that appear under their name only when they are complete, and locks of files and folders."""
 
 import os
 import re
@@ -18,22 +18,21 @@ except ImportError:  # a system without such locks
     fcntl = None  # type: ignore[assignment]
 
 
-HDF5 = (".h5", ".hdf5")  # endings of our binary files
+HDF5 = (".h5", ".hdf5")  # endings of the binary files of wrcore
 
 
 def named(path: str | os.PathLike[str], endings: Iterable[str], source: str) -> None:
-    """InputError of a source for a path that does not end as it should."""
+    """Raise an InputError of ``source`` for a path that has none of these endings."""
     if Path(path).suffix.lower() not in endings:
         raise InputError(source, path, f"expected a name that ends in {' or '.join(endings)}")
 
 
 @contextmanager
 def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
-    """A new file, to be written and read, that replaces one of its name when it is complete; OSError names the path
-    where the disk or a quota is full.
+    """Open a new file for writing and reading; when it is complete, it replaces the file of this name.
 
-    Until then it has a hidden name of its own and is locked. Hidden files of that kind whose writer is gone are removed
-    by whoever writes the name next.
+    Until then the file has a hidden name and is locked. Hidden files of processes that were killed are removed when
+    this name is written again. An OSError names the path if the disk or a quota is full.
     """
     path = Path(path)
     if not path.name:
@@ -59,7 +58,7 @@ def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
 
 
 def try_out(path: str | os.PathLike[str]) -> None:
-    """OSError where nothing can be written under a name, or under the longest that is derived from it."""
+    """Raise an OSError if no file can be written under a name, or under the longest name derived from it."""
     path = Path(path)
     part = path.with_name(f".{path.name}.parts.{secrets.token_hex(4)}.part")
     part.open("xb").close()
@@ -67,7 +66,7 @@ def try_out(path: str | os.PathLike[str]) -> None:
 
 
 def locked(descriptor: int) -> bool:
-    """Lock an open file or folder for this process, which ends the lock however it ends; False if it has one."""
+    """Lock an open file or folder until this process ends; return False if another process has locked it."""
     try:
         if fcntl is not None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -78,7 +77,7 @@ def locked(descriptor: int) -> bool:
 
 @contextmanager
 def held(folder: Path, told: object) -> Iterator[None]:
-    """A folder, made if needed, that this process alone writes to meanwhile; else an InputError of ``told``."""
+    """Lock a folder, created if needed, for this process during a block; an InputError names ``told``."""
     lock = hold(folder, told)
     try:
         yield
@@ -87,7 +86,7 @@ def held(folder: Path, told: object) -> Iterator[None]:
 
 
 def hold(folder: Path, told: object) -> int:
-    """Descriptor of a folder, made if needed, that this process alone holds until it is closed, however it ends."""
+    """Return the descriptor of a folder, created if needed, that is locked until the descriptor is closed."""
     while True:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -97,21 +96,21 @@ def hold(folder: Path, told: object) -> int:
         if not locked(lock):
             os.close(lock)
             raise InputError("--out", told, "expected a file that no other process is writing")
-        with suppress(FileNotFoundError):  # whoever held it before may just have removed it
+        with suppress(FileNotFoundError):  # the former holder may just have removed it
             if os.path.samestat(os.fstat(lock), os.stat(folder)):
                 return lock
         os.close(lock)
 
 
 def remove_folder(folder: Path) -> None:
-    """Remove a folder at once: it loses its name first and its content then."""
+    """Remove a folder: first it is renamed, so that its name is free at once, then its content is deleted."""
     gone = folder.with_name(f"{folder.name}.{secrets.token_hex(4)}.part")
     os.replace(folder, gone)
     shutil.rmtree(gone, ignore_errors=True)
 
 
 def remove_remains(path: Path) -> None:
-    """Remove what killed processes left of `appearing` and `remove_folder`: hidden, ours, and held by nobody."""
+    """Remove hidden files and folders that killed processes left, if the user owns them and they are not locked."""
     if fcntl is None:
         return
     left = re.compile(rf"\.{re.escape(path.name)}\.((parts|[0-9a-f]{{16}})\.)?[0-9a-f]{{1,8}}\.part")

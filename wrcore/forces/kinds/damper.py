@@ -25,8 +25,7 @@ def velocity(elements, k, stretch, speed, inner, press):
 
 @jit(allocates=False, fastmath=FUSED)
 def series(elements, k, stretch, speed, inner, press):
-    """Return the force k (x - s) = c s' of spring and linear damper in series, with the damper displacement s as
-    state."""
+    """Return the force k (x - s) = c s' of spring and linear damper in series; s is the damper displacement."""
     stiffness, damping = law.numbers(elements, k)[:2]
     force = stiffness * (stretch - inner)
     rate = force / damping

@@ -1,13 +1,15 @@
 """Friction along one direction that sticks and slips; its limit may increase with the force in another element.
 
 The limit L is a constant force plus mu times the normal force N in another element of the same pair of bodies. There
-are two laws, both with a displacement as internal state. *Slider*: a slider at s and a spring of stiffness c in series
-have the force f = c (x - s). From the force L - w on, the slider moves with s' = x' (g - L + w)/w, g = f sign(x'); at g
-= L it is as fast as x, at any speed. If L decreases below |f|, the term (|f| - L) sign(f)/(c T) with T = 1 ms is added
-to s', so that f decreases at rest, too. Both terms dissipate energy. *Approach*: Fancher's exponential approach to the
-limit over a distance b, f = L z/b with z' = x' - |x'| z/b. Without reversal f - L decreases by the factor 1/e over b,
-at any speed. At constant L the stored energy is L z^2/(2 b), the dissipated power L |x'| (z/b)^2. A link of length l
-that hangs under N adds the force N x/l.
+are two laws, both with a displacement as internal state.
+
+*Slider*: a slider at s and a spring of stiffness c in series have the force f = c (x - s). From the force L - w on, the
+slider moves with s' = x' (g - L + w)/w, g = f sign(x'). At g = L it is as fast as x, at any speed. If L decreases below
+|f|, the term (|f| - L) sign(f)/(c T) with T = 1 ms is added to s', so that f decreases at rest, too. Both terms
+dissipate energy.
+*Approach*: Fancher's exponential approach to the limit over a distance b, f = L z/b with z' = x' - |x'| z/b. Without
+reversal f - L decreases by the factor 1/e over b, at any speed. At constant L the stored energy is L z^2/(2 b), the
+dissipated power L |x'| (z/b)^2. A link of length l that hangs under N adds the force N x/l.
 
 References
 ----------
