@@ -49,7 +49,7 @@ def _cut(part):
 
 
 class UnknownNameError(InputError, KeyError):
-    """Error for an unknown name, for example of a channel or a body."""
+    """Error for a name that a collection does not contain, for example a channel that a run does not have."""
 
 
 def short(value):

@@ -109,7 +109,10 @@ _LIMITS = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and non
 
 
 def read_yaml(path):
-    """Read one YAML mapping; an InputError is raised for a missing file, wrong UTF-8 or YAML, and repeated keys."""
+    """Read one YAML mapping.
+
+    An InputError is raised for a missing file, text that is not UTF-8 or YAML, repeated keys, and other content than a
+    mapping."""
     text = ""
     try:
         check_regular(path)

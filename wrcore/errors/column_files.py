@@ -354,7 +354,7 @@ def _split(line, separator):
 
 
 def _evened(rows, count, separator):
-    """Return rows of equal length: without empty cells at all beginnings or ends, repeated tabs merged."""
+    """Return rows without cells that are empty at the beginning or end of all rows, and with repeated tabs merged."""
     if separator == "\t" and len({len(row) for row in rows} | ({count} if count else set())) > 1:
         joined = [[cell for k, cell in enumerate(row) if cell or k == len(row) - 1] for row in rows]
         if len({len(row) for row in joined} | ({count} if count else set())) == 1:

@@ -1,11 +1,11 @@
-"""Kernels of a first run, compiled by a second process while this one compiles others.
+"""Compilation of some kernels of a first run by a second process, while the main process compiles the others.
 
-A run knows the types of all its kernels before it compiles one (`planned`). Those that it needs last go to a second
-process, which leaves them in the cache; who needs one of them waits for it. Where that fails, or only one processor is
-there, all are compiled here, as if nothing had been.
+The types of all kernels of a run are known before the first one is compiled (`planned`). The second process compiles
+the kernels that are needed last and writes them into the cache. The main process waits if it needs one of them. If the
+second process fails, or if the machine has only one processor, the main process compiles all kernels.
 
-What kernels link is a matter of each process: numba numbers what it compiles, and with pieces of both, as it happened
-that one was there before the other, a kernel had some twice, was inlined otherwise, and rounded otherwise.
+Each process compiles all parts that its kernels link. Numba numbers these parts. If parts from both processes were
+linked, some parts would be duplicates in an order that varies, which changes inlining and rounding.
 """
 
 import atexit
@@ -29,19 +29,21 @@ aside.compile_all(pickle.loads(kernels))
 """
 
 linked = ""
-"""Folder below that of the kernels where this process keeps what kernels link."""
+"""Subfolder of the kernel folder in which this process stores the linked form of kernels."""
 
 _PLAN, _NEEDED_LAST = ContextVar("plan", default=None), ContextVar("needed_last", default=None)
 
 
 def planned():
-    """The list to which kernels are added in place of being compiled, each with the types of its arguments, or None."""
+    """Return the list that collects kernels, with the types of their arguments, without compilation; else None."""
     return _PLAN.get()
 
 
 @contextmanager
 def planning():
-    """Let kernels be added to a list in place of being compiled: what is made meanwhile is good for its types alone."""
+    """Collect kernels in a list without compilation during a block.
+
+    Objects that are created meanwhile have the right types, but cannot be called."""
     token = _PLAN.set([])
     try:
         yield _PLAN.get()
@@ -51,8 +53,9 @@ def planning():
 
 @contextmanager
 def compiled_aside(needed_last):
-    """Let a second process begin as soon as a kernel is not in the cache: with those that ``needed_last()`` gives, each
-    with the types of its arguments."""
+    """Start a second process during a block as soon as a kernel is missing in the cache.
+
+    The process compiles the kernels that ``needed_last()`` returns, each with the types of its arguments."""
     token = _NEEDED_LAST.set(needed_last)
     try:
         yield
@@ -61,7 +64,7 @@ def compiled_aside(needed_last):
 
 
 class _Process:
-    """A second process and the names of the kernels that it still has to compile."""
+    """Second process, and the names of the kernels that it has not yet compiled."""
 
     def __init__(self, kernels):
         self.left = [name for name, _ in kernels]
@@ -74,7 +77,7 @@ class _Process:
             its.write(pickle.dumps((sys.path, pickle.dumps(kernels))))
 
     def wait_for(self, name):
-        """Wait until a kernel is in the cache, or never will be."""
+        """Wait until a kernel is in the cache or the process has ended."""
         while name in self.left:
             if self._process.stdout.readline():
                 del self.left[0]
@@ -82,7 +85,7 @@ class _Process:
                 self.left.clear()
 
     def over(self):
-        """Whether nothing more comes of it."""
+        """Whether the process has compiled all its kernels or has ended; if so, release it."""
         over = not self.left or self._process.poll() is not None
         if over:
             self._process.stdout.close()
@@ -95,7 +98,9 @@ _running = None
 
 
 def missed(function, form):
-    """Whether a kernel that is not in the cache may be there now; called by one thread after the other."""
+    """Whether a kernel that was missing in the cache may be there now, after waiting for the second process.
+
+    Start this process if it is not running. Only one thread at a time calls this function."""
     global _running
     name, needed_last = _name(function, form), _NEEDED_LAST.get()
     waited = _running is not None and name in _running.left
@@ -105,13 +110,13 @@ def missed(function, form):
         _running = None
     if _running is None and needed_last is not None:
         _NEEDED_LAST.set(None)
-        with suppress(Exception):  # who needs them compiles them, and says what is wrong
+        with suppress(Exception):  # the main process compiles them and reports the error
             _running = _begun(needed_last)
     return waited
 
 
 def _begun(needed_last):
-    """A `_Process`; None where it would not be worth it."""
+    """Start and return a `_Process`; None with one processor or in a host program that embeds Python."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     if processors == 1 or not Path(sys.executable or "").name.startswith("python"):  # a host that embeds Python
         return None
@@ -123,7 +128,7 @@ def _name(function, form):
 
 
 def compile_all(kernels):
-    """What the second process does."""
+    """Compile kernels in the second process and print the name of each one when it is in the cache."""
     for name, types in kernels:
         module, function, form = name
         getattr(import_module(module), function).in_form(form).compile(types)

@@ -1,7 +1,7 @@
-"""The folder for what can be rebuilt, compiled kernels and creep tables: real, and nobody else's to write to.
+"""Cache folder for compiled kernels and creep tables, which only the user may write to.
 
-Compiled kernels are pickles: whoever may write to their folder runs code as whoever loads them. A folder that is not
-safe, or that cannot be written, is left alone, and a temporary one serves the process.
+Compiled kernels are pickles: a person who can write to the folder can run code in the name of each user who loads them.
+If the folder is not safe or cannot be written, the process uses a temporary folder instead.
 """
 
 import atexit
@@ -27,18 +27,18 @@ _ROOT = Path(__file__).parents[1]
 
 
 def source_digest():
-    """Digest (16 hex digits) of the sources that kernels are made of, as this process first read them."""
+    """Return the digest (16 hex digits) of all sources of kernels, as this process first read them."""
     return _first_read()[0]
 
 
 def sources_changed():
-    """Whether a source was edited since: what is imported later is no longer what the digest says."""
+    """Whether a source was edited after the digest was computed, so that later imports may not match the digest."""
     return _stamps() != _first_read()[1]
 
 
 @cache
 def _first_read():
-    """Digest of the sources, and their stamps before they were read."""
+    """Return the digest of the sources, and their stamps before they were read."""
     stamps, digest = _stamps(), hashlib.sha256()
     for name, _, _ in stamps:
         digest.update(name.encode())
@@ -47,39 +47,40 @@ def _first_read():
 
 
 def _stamps():
-    """Name, time and size of each source."""
+    """Return name, modification time and size of each source."""
     paths = sorted(path for room in KERNEL_ROOMS for path in (_ROOT / room).rglob("*.py"))
     states = ((path, path.stat()) for path in paths)
     return [(path.relative_to(_ROOT).as_posix(), state.st_mtime_ns, state.st_size) for path, state in states]
 
 
 def kernel_folder():
-    """Folder of the kernels of this source state."""
+    """Return the folder of the kernels that were compiled from the present sources."""
     return cache_root() / "kernels" / source_digest()
 
 
 def table_folder():
-    """Folder of the creep tables."""
+    """Return the folder of the creep tables."""
     return cache_root() / "tables"
 
 
 def cache_root():
-    """Folder for everything that can be rebuilt: ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's
-    cache folder (``XDG_CACHE_HOME`` or ``~/.cache``); where that is not safe, a temporary one with a line of
-    warning."""
+    """Return the cache folder: ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's cache folder.
+
+    The latter is ``XDG_CACHE_HOME`` or ``~/.cache``. If the folder is not safe, wrcore warns and uses a temporary
+    folder."""
     return _prepared(os.environ.get("WRCORE_CACHE") or _default())
 
 
 def _default():
     try:
         return os.path.join(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "wrcore")
-    except RuntimeError:  # nobody's home
+    except RuntimeError:  # no home folder
         return ""
 
 
 @cache
 def _prepared(wanted):
-    """The wanted folder with its parts, or a temporary one instead."""
+    """Create the wanted folder with its subfolders, or a temporary one if this fails, and return its path."""
     try:
         if not wanted:
             raise OSError(0, "expected a home folder or WRCORE_CACHE")
@@ -97,7 +98,7 @@ def _with_parts(root):
     for folder in (root, root / "tables", kernels, kernels / source_digest()):
         _claim(folder)
     os.utime(folder)
-    for below, names, _ in os.walk(folder):  # numba's own folders hold the pickles
+    for below, names, _ in os.walk(folder):  # subfolders made by numba hold the pickles
         for name in names:
             _claim(Path(below, name))
     _drop_old(kernels)
@@ -105,7 +106,9 @@ def _with_parts(root):
 
 
 def _claim(folder):
-    """Make a folder, or see that it is real, ours, closed to others' writing and open to ours; OSError if not."""
+    """Create a folder, or check an existing one; raise an OSError if the check fails.
+
+    The folder must not be a link, must belong to the user, and only the user may write to it."""
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700, parents=True)
     status = folder.lstat()
@@ -123,9 +126,9 @@ def _claim(folder):
 
 
 def _drop_old(kernels):
-    """Drop kernels that were not used for two weeks: numba's files in folders that we named, and nothing else."""
+    """Delete kernels that were not used for two weeks: only files of numba in folders named by a source digest."""
     for old in os.scandir(kernels):
-        with suppress(OSError):  # another process clears at the same time
+        with suppress(OSError):  # another process deletes at the same time
             own = re.fullmatch("[0-9a-f]{16}", old.name) and old.is_dir(follow_symlinks=False)
             if not own or time.time() - old.stat(follow_symlinks=False).st_mtime < _KEEP_SECONDS:
                 continue
@@ -137,7 +140,7 @@ def _drop_old(kernels):
 
 
 def drop_unused(folder, pattern):
-    """Drop a folder's files that nobody used for two weeks."""
+    """Delete the files of a folder that match ``pattern`` and were not used for two weeks."""
     for old in folder.glob(pattern):
         with suppress(OSError):
             if time.time() - old.stat().st_mtime > _KEEP_SECONDS:
@@ -154,7 +157,7 @@ _UNTOLD = ContextVar("untold", default=False)
 
 @contextmanager
 def untold():
-    """Warn of nothing meanwhile in this thread: of files that nobody but a run itself has written."""
+    """Suppress warnings in this thread during a block, for input files that a computation itself has written."""
     before = _UNTOLD.set(True)
     try:
         yield
@@ -163,7 +166,7 @@ def untold():
 
 
 def warn(text):
-    """Say something on standard error, once."""
+    """Print a warning on standard error, unless the process has printed it already or warnings are suppressed."""
     if not _UNTOLD.get():
         _say_once(text)
 
@@ -174,6 +177,6 @@ def _say_once(text):
 
 
 def say(text):
-    """Say something on standard error, where there is one."""
+    """Print a line on standard error if the process has one."""
     if sys.stderr is not None:  # in a process without a console
         print(f"wrcore: {text}", file=sys.stderr, flush=True)

@@ -1,10 +1,10 @@
-"""The three forms in which a kernel is compiled, each only when somebody asks for it.
+"""Three compiled forms of a kernel, each compiled only when needed.
 
-called     from Python: machine code, and the wrapper that takes Python's arguments apart
-addressed  by its address (`wrcore.kernels.handles.Kernel`): machine code
-linked     from other kernels: what LLVM links into them, no machine code
+called     called from Python: machine code, and the wrapper that converts arguments of Python
+addressed  called by its address (`wrcore.kernels.handles.Kernel`): machine code
+linked     called from other kernels: code that LLVM links into them, no machine code
 
-Numba makes all of it for every kernel, with a wrapper for C besides. Most kernels are called by other kernels alone.
+Numba compiles all forms of every kernel, and a wrapper for C. Most kernels are called only by other kernels.
 """
 
 import gc
@@ -31,10 +31,10 @@ _FOLDER = str(kernel_folder())
 
 
 class _Intermediate(JITCodeLibrary):
-    """A kernel's code before any machine's, for others to link.
+    """Intermediate code of a kernel (LLVM), which other kernels link.
 
-    Who links it optimises it with its own: a kernel that is called over ten others would else be optimised ten times,
-    which was a fifth of a first run."""
+    It is optimised together with the code of the calling kernel only. Otherwise a kernel that is called through a chain
+    of ten others would be optimised ten times, which took a fifth of a first run."""
 
     def _optimize_final_module(self):
         pass
@@ -47,7 +47,7 @@ class _Intermediate(JITCodeLibrary):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _Register(AnalysisPass):
-    """Let other kernels find a linked kernel, as numba does with those that have machine code."""
+    """Compiler pass that registers a linked kernel for its callers, as numba does for kernels with machine code."""
 
     _name = "wrcore_register_linked"
 
@@ -66,10 +66,10 @@ _helpers = {}
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's passes, with the helpers (powers) of kernels that have the same fast-math flags.
+    """Compiler with numba's passes, and separate helper functions (powers) for each set of fast-math flags.
 
-    Numba compiles a helper once in a process, with the flags of the kernel that needs it first: its last bits would
-    depend on which kernel that was."""
+    Numba compiles a helper once in a process, with the flags of the kernel that needs it first. Its rounding would
+    depend on the order of compilation."""
 
     def define_pipelines(self):
         state = self.state
@@ -82,7 +82,7 @@ class KernelCompiler(CompilerBase):
 
 
 class _LinkedCompiler(KernelCompiler):
-    """The passes but for the last one, which makes machine code."""
+    """Compiler with all passes except the last one, which generates machine code."""
 
     def _passes(self, state):
         state.flags.no_compile = True
@@ -94,7 +94,7 @@ class _LinkedCompiler(KernelCompiler):
 
 
 class _LinkedFile(CompileResultCacheImpl):
-    """What of a linked kernel is kept on disk."""
+    """Data of a linked kernel in the cache on disk."""
 
     def reduce(self, result):
         result.library._ensure_finalized()
@@ -118,8 +118,10 @@ class _LinkedFile(CompileResultCacheImpl):
 
 
 class _MachineCode(CompileResultCacheImpl):
-    """What of a kernel with machine code is kept on disk. Numba would keep what others link, too, and read it at every
-    start; that is another form here, and of this one the functions' names do."""
+    """Data of a kernel with machine code in the cache on disk.
+
+    Numba would also store the code for linking and read it at each start. Here this is a separate form; the names of
+    the functions are sufficient."""
 
     def reduce(self, result):
         (name, kind, (code, linked)), *rest = super().reduce(result)
@@ -129,7 +131,7 @@ class _MachineCode(CompileResultCacheImpl):
 
 
 class KernelCache(FunctionCache):
-    """Numba's cache of a kernel in one form; one that is damaged, or full, stops nothing."""
+    """Numba's cache of a kernel in one form; a damaged file or a full disk only causes a warning."""
 
     def __init__(self, function, form="called"):
         self._form, self._function = form, function
@@ -140,7 +142,7 @@ class KernelCache(FunctionCache):
             super().__init__(function)
         finally:
             numba.config.CACHE_DIR = before
-        for made in (folder, self.cache_path):  # closed to others, whatever the process's mask
+        for made in (folder, self.cache_path):  # no access for other users, independent of umask
             if made.startswith(_FOLDER + os.sep):
                 os.chmod(made, 0o700)
 
@@ -148,12 +150,12 @@ class KernelCache(FunctionCache):
         return (self._form, *super()._index_key(*args))
 
     def load_overload(self, *args):
-        """The kernel for some types, or None."""
+        """Return the cached kernel for a signature, or None."""
         found = self._load(*args)
         return self._load(*args) if found is None and aside.missed(self._function, self._form) else found
 
     def _load(self, signature, target_context):
-        """As numba's `load_overload`, without what compilers need, a tenth of every start."""
+        """Load a kernel from the cache without initialising the compiler, which would take a tenth of every start."""
         rtsys.initialize(target_context)
         try:
             with self._guard_against_spurious_io_errors():
@@ -164,7 +166,9 @@ class KernelCache(FunctionCache):
         return None
 
     def save_overload(self, *args):
-        """Keep a kernel; not if its sources were edited since this process began, whose digest names the folder."""
+        """Store a kernel in the cache, unless its sources were edited after the start of this process.
+
+        The folder is named by the digest of the sources at the start."""
         if sources_changed():
             warn("sources of kernels were edited while this process ran: its kernels are not kept")
         else:
@@ -178,7 +182,7 @@ class KernelCache(FunctionCache):
 
 
 def _set_environments(result):
-    """Hand kernels linked into this one the globals that some error messages need, as numba does after loading."""
+    """Set the globals that error messages of linked kernels need, as numba does after loading."""
     for environment in result._find_referenced_environments():
         result.library.codegen.set_env(environment.env_name, environment)
 
@@ -188,9 +192,10 @@ _COMPILING = "compiling, once: about half a minute for a scene of a new kind, a 
 
 @contextmanager
 def _rarely_collected():
-    """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
-    and looking took it a tenth of its time. One thread after the other, as they compile: else one would take for usual
-    what another one has set. What takes long is told."""
+    """Run Python's garbage collection a hundredth as often during compilation, and print a message if it takes long.
+
+    The small objects of the compiler live until it ends, and collection took a tenth of its time. Only one thread at a
+    time may compile, because the settings of the collection belong to the process."""
     global _compiling
     with global_compiler_lock:
         before = gc.get_threshold()
@@ -206,17 +211,18 @@ def _rarely_collected():
 
 
 _compiling = 0
-"""Kernels that are being compiled, each for the one before it."""
+"""Number of kernels in compilation; each one after the first is compiled for the kernel before."""
 
 
 def _number(kind):
-    """The type of an argument; of a number that the caller knows, that of all such numbers."""
+    """Return the type of an argument; for a literal number the general type of the number."""
     return types.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
 
 
 class _Form(CPUDispatcher):
-    """A kernel in a ``form`` that Python cannot call: its table of calls gets nothing. One copy serves for all values
-    of a number that callers may know; numba would compile one for each."""
+    """A kernel in a ``form`` that Python cannot call; it is not entered in the dispatcher's table of calls.
+
+    One compiled copy is used for all values of a literal number; numba would compile one copy for each value."""
 
     def get_call_template(self, args, kws):
         return super().get_call_template(tuple(map(_number, args)), {name: _number(kws[name]) for name in kws})
@@ -232,20 +238,20 @@ class _Form(CPUDispatcher):
 
 
 class KernelDispatcher(CPUDispatcher):
-    """A kernel as Python calls it; other kernels get it linked."""
+    """A kernel in the form that Python calls; other kernels use its linked form."""
 
     form = "called"
 
     @property
     def _cache(self):
-        """Made for those that are called: a process imports hundreds of kernels and calls some."""
+        """Cache of the kernel, created at the first call: a process imports hundreds of kernels and calls few."""
         if self._own_cache is None:
             self._own_cache = KernelCache(self.py_func)
         return self._own_cache
 
     @_cache.setter
     def _cache(self, cache):
-        """Numba sets one where it makes a dispatcher from a pickle."""
+        """Set the cache, as numba does when it creates a dispatcher from a pickle."""
         self._own_cache = cache
 
     _own_cache = None
@@ -262,11 +268,11 @@ class KernelDispatcher(CPUDispatcher):
 
     @property
     def is_compiling(self):
-        """Whether it is being compiled, so that a call from within is one to itself."""
+        """Whether the kernel is in compilation, so that a call in its code is a recursion."""
         return self._compiling_counter or self.in_form("linked").is_compiling
 
     def in_form(self, form):
-        """The kernel "linked" or "addressed": a dispatcher of its own; "called": itself."""
+        """Return the dispatcher of a form of this kernel: "linked", "addressed", or "called" (the kernel itself)."""
         forms = self.__dict__.setdefault("forms", {"called": self})
         if form not in forms:
             options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}

@@ -1,9 +1,8 @@
-"""Models in kernels behind a pointer, and kernels behind an address.
+"""Models that are passed to kernels by pointer, and kernels that are called by address.
 
-A model holds some sixty arrays. Handed over by value they are 400 words at every call, and a kernel that calls another
-one is compiled together with it. A `Handle` keeps a model in memory instead: in kernels ``model.contact.friction`` then
-reads what it names, and calls pass one address. A `Kernel` called by its address (`call_at`) is compiled once, however
-many others call it.
+A model holds about sixty arrays. By value they are 400 words at each call, and a kernel is compiled together with all
+kernels that it calls. A `Handle` keeps a model in memory instead: in kernels ``model.contact.friction`` then reads this
+field, and calls pass one address. A `Kernel` called by its address (`call_at`) is compiled once for all its callers.
 """
 
 import struct
@@ -27,7 +26,7 @@ _INDEX = ir.IntType(32)
 
 
 class Reference(types.Type):
-    """Type of the address of a value in memory; fields of a named tuple are read through it."""
+    """Type of the address of a named tuple in memory, through which kernels read its fields."""
 
     def __init__(self, target):
         self.target = target
@@ -45,7 +44,7 @@ class _Fields(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, reference, name):
-        """Named tuples in a named tuple are references again, all else is read."""
+        """Return the type of a field: a reference for a named tuple, else the type of its value."""
         if name not in reference.target.fields:
             return None
         field = reference.target.types[reference.target.fields.index(name)]
@@ -53,7 +52,7 @@ class _Fields(AttributeTemplate):
 
 
 def _read(builder, place):
-    """Value at a place, number by number: what is not used is not read. No kernel changes it."""
+    """Generate code that reads a value number by number, so that unused numbers are not read. No kernel changes it."""
     kind = place.type.pointee
     if not isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
         number = builder.load(place)
@@ -73,7 +72,7 @@ def _get_field(context, builder, reference, pointer, name):
     if isinstance(field, types.BaseNamedTuple):
         return place
     value = _read(builder, place)
-    if context.enable_nrt and isinstance(field, types.Array):  # the handle keeps it alive, nobody counts references
+    if context.enable_nrt and isinstance(field, types.Array):  # kept alive by the handle, not counted
         array = context.make_array(field)(context, builder, value=value)
         array.meminfo = cgutils.get_null_value(array.meminfo.type)
         array.parent = cgutils.get_null_value(array.parent.type)
@@ -97,7 +96,7 @@ def _write(value, memory):
 
 
 def _format_of(kind, begin=0):
-    """How `struct` lays out a value of a type as C does, from ``begin``, where it ends and on what it is aligned."""
+    """Return the format of `struct` for a type with the layout of C from byte ``begin``, its end, and its alignment."""
     if isinstance(kind, types.BaseTuple):
         parts, end, coarsest = "", begin, 1
         for one in kind.types:
@@ -114,8 +113,9 @@ _CODES = {"f8": "d", "f4": "f", "i8": "q", "i4": "i", "u8": "Q", "u4": "I", "b1"
 
 
 def _add_numbers(kind, value, numbers):
-    """Add the numbers that a value is in memory to a list. A kernel that lays values out has to be compiled for each
-    type, at a second each."""
+    """Append the numbers that represent a value in memory to the list ``numbers``.
+
+    A kernel that writes values would have to be compiled for each type, which takes a second."""
     if isinstance(kind, types.BaseTuple):
         for one, part in zip(kind.types, value, strict=True):
             _add_numbers(one, part, numbers)
@@ -128,8 +128,9 @@ def _add_numbers(kind, value, numbers):
 
 @intrinsic
 def other_at(_, reference, address):
-    """Reference to another value of the type of a reference, at an address; itself where that is 0. What is no
-    reference stays what it is."""
+    """Return a reference to the value at an address, of the type of ``reference``; for address 0 ``reference`` itself.
+
+    An argument that is not a reference is returned unchanged."""
 
     def generate(context, builder, call, arguments):
         if not isinstance(reference, Reference):
@@ -153,14 +154,14 @@ _TYPE_OF_ARRAY = typeof_impl.dispatch(np.ndarray)
 
 @typeof_impl.register(np.ndarray)
 def _type_of_array(value, context):
-    """Type of an array, as numba's own, which imports all of numpy.ma (40 ms) to ask whether it is one of that."""
+    """Return the numba type of an array without importing numpy.ma, for which numba's function takes 40 ms."""
     if type(value) is not np.ndarray or value.dtype.kind not in "biuf":
         return _TYPE_OF_ARRAY(value, context)
     return types.Array(from_dtype(value.dtype), value.ndim, map_layout(value), readonly=not value.flags.writeable)
 
 
 class Handle:
-    """A named tuple of arrays and numbers, kept in memory as long as the handle, for kernels that allocate nothing."""
+    """A named tuple of arrays and numbers in memory, to be passed to kernels by its address while this object lives."""
 
     def __init__(self, value):
         self.value = value
@@ -170,20 +171,21 @@ class Handle:
         self.address = self._memory.ctypes.data
 
     def lay(self, value):
-        """Keep another value of the same type."""
+        """Write another value of the same type into the memory of the handle."""
         self.value, numbers = value, []
         _add_numbers(self._numba_type_.target, value, numbers)
         self._format.pack_into(self._memory, 0, *numbers)
 
     def renew(self, value):
-        """As `lay`, in a tenth of the time, by a kernel that takes two seconds to compile."""
+        """Write another value of the same type by a kernel: ten times as fast as `lay`, but 2 s for its compilation."""
         self.value = value
         _write(value, self._memory)
 
 
 class Handles:
-    """`Handle` of each of some ``values`` of one type. ``np.asarray`` of it is the array of their addresses and keeps
-    it alive; see `values_of`."""
+    """`Handle` objects of several ``values`` of one type.
+
+    ``np.asarray`` of this object is the array of the addresses, which keeps the object alive; see `values_of`."""
 
     def __init__(self, values):
         self.values = tuple(values)
@@ -196,12 +198,12 @@ class Handles:
 
 
 def values_of(addresses):
-    """The values of `Handles` from the array of their addresses."""
+    """Return the values of `Handles` from the array of their addresses."""
     return addresses.base.values if len(addresses) else ()
 
 
 class Kind:
-    """The type of a `Handle` without its value: what kernels are compiled for."""
+    """Type of a `Handle` without a value, as an example argument for the compilation of kernels."""
 
     def __init__(self, value):
         self._numba_type_, _, _ = _layout(value)
@@ -211,8 +213,7 @@ _LAYOUTS = {}
 
 
 def _layout(value):
-    """Type of a handle, `struct.Struct` of its value and the bytes that this takes: found once for all values of a
-    type."""
+    """Return the type of a handle, the `struct.Struct` of its value, and its size in bytes; computed once per type."""
     key = compute_fingerprint(value)
     if key not in _LAYOUTS:
         kind, context = typeof(value), cpu_target.target_context
@@ -236,12 +237,14 @@ class _KernelModel(models.PrimitiveModel):
 
 
 FOUR = types.UniTuple(types.float64, 4)
-"""Type of four numbers."""
+"""Type of a tuple of four numbers."""
 
 
 class Kernel:
-    """A kernel that returns nothing (or ``returns``), compiled (or loaded) for the types of example arguments, to be
-    called by its address as long as this object lives; where that is only `planned`, none can be called."""
+    """A kernel compiled or loaded for the types of example arguments, to be called by its address.
+
+    It returns nothing, or a value of the type ``returns``. The address is valid as long as this object lives. If
+    compilation is only `planned`, the kernel cannot be called."""
 
     def __init__(self, function, *examples, returns=types.none):
         signature = tuple(typeof(example) for example in examples)
@@ -255,7 +258,7 @@ class Kernel:
         compiled = function.overloads[signature]
         if compiled.signature.return_type != returns:
             raise TypeError(f"{function.__name__}: expected a kernel that returns {returns}, not {compiled.signature}")
-        self._function = function  # its code may call what lives with it: plain Python of a user's own
+        self._function = function  # keeps alive plain Python of a user that its code may call
         self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
@@ -270,7 +273,7 @@ def _unbox_address(kind, holder, c):
 
 
 def _call(context, builder, call, values):
-    """Call what ``values[0]`` points at with the arguments in ``values[1]``."""
+    """Generate a call of the function at the address ``values[0]`` with the arguments in ``values[1]``."""
     kinds = tuple(call.args[1])
     handed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
     function = context.call_conv.get_function_type(call.return_type, kinds).as_pointer()
@@ -284,7 +287,7 @@ def _call(context, builder, call, values):
 
 @intrinsic
 def call_at(_, kernel, *arguments):
-    """Call a `Kernel` with arguments of just the types that it was compiled for."""
+    """Call a `Kernel` with arguments of exactly the types for which it was compiled."""
     if tuple(arguments) != kernel.arguments:
         raise TypingError(f"a kernel compiled for {kernel.arguments} is called with {tuple(arguments)}")
     return types.void(kernel, types.StarArgTuple(arguments)), _call
@@ -292,19 +295,19 @@ def call_at(_, kernel, *arguments):
 
 @intrinsic
 def call_address(_, address, *arguments):
-    """Call the `Kernel` with this ``address``, a field of a model say; the types of the arguments are not checked."""
+    """Call the `Kernel` with this ``address``, for example a field of a model; argument types are not checked."""
     return types.void(types.int64, types.StarArgTuple(arguments)), _call
 
 
 @intrinsic
 def four_at(_, address, *arguments):
-    """The four numbers that the `Kernel` with this ``address`` returns; all else as for `call_address`."""
+    """Call the `Kernel` with this ``address`` and return its four numbers; argument types are not checked."""
     return FOUR(types.int64, types.StarArgTuple(arguments)), _call
 
 
 @intrinsic
 def call_c(_, address, *numbers):
-    """Call the C function with this address, ``void f(int64_t, ...)``, with whole numbers."""
+    """Call the C function with this address, ``void f(int64_t, ...)``, with integers."""
 
     def generate(context, builder, call, values):
         count = len(call.args[1])

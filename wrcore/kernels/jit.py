@@ -1,8 +1,7 @@
-"""The one compile decorator, and a cache folder that never serves stale kernels.
+"""Compile decorator for all kernels, with a cache that never returns kernels of edited sources.
 
-Numba notices edits of the file that holds a kernel, but not of a kernel imported from another file. The cache
-folder is therefore named after the content of all sources in the rooms that hold kernels: an edit there starts a
-fresh cache.
+Numba detects edits of the file that holds a kernel, but not edits of kernels imported from other files. The name of the
+cache folder is therefore a digest of all sources in packages with kernels: after an edit a new folder is used.
 """
 
 import numba
@@ -17,28 +16,27 @@ if numba.config.DISABLE_JIT:
     raise InputError("NUMBA_DISABLE_JIT", "", "expected it unset: kernels hand each other addresses of compiled code")
 
 _ensured, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-from numba.np import arraymath  # noqa: E402, F401  it would import scipy.linalg, a tenth of every start, to see it is there
+from numba.np import arraymath  # noqa: E402, F401  would import scipy.linalg, a tenth of every start, as a test
 
 linalg.ensure_blas = _ensured
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
-"""Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
+"""Fast-math flags for scan loops: sums may be reordered; NaN and infinity are still handled correctly."""
 
 FUSED = {"contract"}
 """Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once.
 
-Which ones do depends on the code around. A kernel that is called, not inlined, exists once in each kernel that calls
-it; the search for overlaps, where this showed, goes without the flag so that all copies give the same bits."""
+The compiler selects them depending on the surrounding code. A kernel that is called and not inlined has a copy in each
+calling kernel. The search for overlaps does not use this flag, so that all copies are bitwise identical."""
 
 
 def jit(function=None, *, allocates=True, **options):
-    """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch); ``options`` are numba's,
-    ``fastmath=FAST`` for scan loops only.
+    """Compile a kernel with ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
 
-    What is not asked for is switched off: numba would hand fast math and inlining on from the first caller that has a
-    kernel compiled, so that its code depended on who came first. With ``allocates=False``, for kernels that create no
-    arrays but views, numba counts no references, which costs more than the arithmetic where a kernel is handed a tuple
-    of many arrays."""
+    ``options`` are those of numba; ``fastmath=FAST`` is for scan loops only. Fast math and inlining are off by default:
+    numba would otherwise take them from the first caller, and the code would depend on the order of compilation.
+    ``allocates=False`` is for kernels that create no arrays except views: numba then counts no references. Counting
+    costs more than the arithmetic if the argument of a kernel is a tuple of many arrays."""
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
     settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}
@@ -51,7 +49,7 @@ def jit(function=None, *, allocates=True, **options):
 
 @intrinsic
 def rarely_called(_):
-    """In a kernel's first line: keep it out of its callers, whose common path should not carry its registers along."""
+    """Prevent inlining of a kernel, as its first line, so that the usual path of its callers needs fewer registers."""
 
     def generate(context, builder, __, ___):
         for attribute in ("noinline", "cold"):

@@ -1,9 +1,8 @@
-"""Vector registers in kernels: four, eight or 32 float64 side by side, for loops that the compiler does not vectorise
-well.
+"""Vector types of four, eight or 32 float64 (lanes) for kernels, for loops that the compiler does not vectorise well.
 
-A kernel writes ``x = load8(a, row, i)`` and calculates with + - * / as with numbers; a number beside lanes counts for
-all of them. Products and sums are fused (`FUSED` of `wrcore.kernels.jit`). Processors without such wide registers take
-several. No bounds are checked.
+A kernel loads lanes with ``x = load8(a, row, i)`` and computes with + - * / as with numbers; in an expression with
+lanes a number is used for all lanes. Products and sums are fused (`FUSED` of `wrcore.kernels.jit`). A processor without
+such wide registers uses several registers. Indices are not checked.
 """
 
 import operator
@@ -19,7 +18,7 @@ _FUSED, _SUM = ("contract",), ("contract", "reassoc")
 
 
 class Lanes(types.Type):
-    """Type of several float64 in one register."""
+    """Type of several float64 in one vector register."""
 
     def __init__(self, count):
         self.count = count
@@ -27,7 +26,7 @@ class Lanes(types.Type):
 
     @property
     def vector(self):
-        """The LLVM type."""
+        """LLVM vector type of the lanes."""
         return ir.VectorType(_DOUBLE, self.count)
 
 
@@ -41,7 +40,7 @@ FOUR, EIGHT, THIRTY_TWO = Lanes(4), Lanes(8), Lanes(32)
 
 
 def _spread(builder, number, lanes):
-    """The same number in all lanes."""
+    """Generate lanes that all hold ``number``."""
     undefined = ir.Constant(lanes.vector, ir.Undefined)
     first = builder.insert_element(undefined, number, _INDEX(0))
     return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(_INDEX, lanes.count), None))
@@ -53,7 +52,7 @@ def _call(builder, name, result, arguments, **options):
 
 
 def _define(function, instruction):
-    """Let an operator work on lanes and on lanes with a number."""
+    """Define an operator for two lanes, and for lanes and a number."""
     pairs = [(a, b) for lanes in (FOUR, EIGHT, THIRTY_TWO)
              for a, b in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes))]  # fmt: skip
 
@@ -78,7 +77,7 @@ for _function, _instruction in (
 
 
 def _load(builder, array, kind, offset, lanes):
-    """Lanes from an ``array`` of a numba type ``kind``."""
+    """Generate code that loads lanes from an ``array`` of the numba type ``kind``."""
     single = kind.dtype == types.float32
     vector = ir.VectorType(ir.FloatType() if single else _DOUBLE, lanes.count)
     found = builder.load(
@@ -88,7 +87,7 @@ def _load(builder, array, kind, offset, lanes):
 
 
 def _of_row(lanes):
-    """Code generator of lanes from a row of a matrix."""
+    """Return a code generator that loads lanes from a row of a matrix."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
@@ -100,7 +99,7 @@ def _of_row(lanes):
 
 
 def _of_array(lanes):
-    """Code generator of lanes from an array."""
+    """Return a code generator that loads lanes from an array."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
@@ -110,7 +109,7 @@ def _of_array(lanes):
 
 
 def _into_array(lanes):
-    """Code generator that writes lanes into an array."""
+    """Return a code generator that writes lanes into an array."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
@@ -123,19 +122,19 @@ def _into_array(lanes):
 
 @intrinsic
 def load8(_, rows, row, start):
-    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
+    """Load ``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
     return EIGHT(rows, row, start), _of_row(EIGHT)
 
 
 @intrinsic
 def load32(_, rows, row, start):
-    """``rows[row, start : start + 32]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
+    """Load ``rows[row, start : start + 32]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
     return THIRTY_TWO(rows, row, start), _of_row(THIRTY_TWO)
 
 
 @intrinsic
 def every8(_, rows, row, start, stride):
-    """``rows[row, start : start + 8 * stride : stride]`` of a contiguous (m, n) array of float64; all unsigned."""
+    """Load ``rows[row, start : start + 8 * stride : stride]`` of a contiguous (m, n) array of float64; all unsigned."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
@@ -153,19 +152,19 @@ def every8(_, rows, row, start, stride):
 
 @intrinsic
 def load4(_, values, start):
-    """``values[start : start + 4]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    """Load ``values[start : start + 4]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
     return FOUR(values, start), _of_array(FOUR)
 
 
 @intrinsic
 def take8(_, values, start):
-    """``values[start : start + 8]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    """Load ``values[start : start + 8]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
     return EIGHT(values, start), _of_array(EIGHT)
 
 
 @intrinsic
 def take32(_, values, start):
-    """``values[start : start + 32]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+    """Load ``values[start : start + 32]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
     return THIRTY_TWO(values, start), _of_array(THIRTY_TWO)
 
 
@@ -183,7 +182,7 @@ def put32(_, values, start, lanes):
 
 @intrinsic
 def lanes8(_, number):
-    """A number in all of eight lanes."""
+    """Return eight lanes that all hold a number."""
 
     def generate(__, builder, ___, arguments):
         return _spread(builder, arguments[0], EIGHT)
@@ -193,7 +192,7 @@ def lanes8(_, number):
 
 @intrinsic
 def ramp8(_):
-    """0, 1, ... 7."""
+    """Return eight lanes with the numbers 0, 1, ... 7."""
 
     def generate(*__):
         return ir.Constant(EIGHT.vector, [float(k) for k in range(8)])
@@ -203,7 +202,7 @@ def ramp8(_):
 
 @intrinsic
 def lane(_, lanes, k):
-    """Number in lane ``k``."""
+    """Return the number in lane ``k``."""
 
     def generate(__, builder, ___, arguments):
         return builder.extract_element(*arguments)
@@ -213,7 +212,7 @@ def lane(_, lanes, k):
 
 @intrinsic
 def total(_, lanes):
-    """Sum of all lanes."""
+    """Return the sum of all lanes."""
 
     def generate(__, builder, call, arguments):
         name = f"llvm.vector.reduce.fadd.v{call.args[0].count}f64"
@@ -224,7 +223,7 @@ def total(_, lanes):
 
 @intrinsic
 def root(_, lanes):
-    """Square roots."""
+    """Return the square root of each lane."""
 
     def generate(_, builder, __, arguments):
         return _call(builder, f"llvm.sqrt.v{lanes.count}f64", lanes.vector, arguments)
@@ -234,7 +233,7 @@ def root(_, lanes):
 
 @intrinsic
 def maximum(_, lanes):
-    """The greatest lane."""
+    """Return the maximum of all lanes."""
 
     def generate(__, builder, call, arguments):
         name = f"llvm.vector.reduce.fmax.v{call.args[0].count}f64"
@@ -245,7 +244,7 @@ def maximum(_, lanes):
 
 @intrinsic
 def below(_, lanes, limit):
-    """Bits of the lanes that are less than ``limit`` (lanes, too): bit k for lane k."""
+    """Return an unsigned integer whose bit k is set if lane k is less than lane k of ``limit``."""
 
     def generate(__, builder, call, arguments):
         less = builder.fcmp_ordered("<", *arguments)
@@ -256,7 +255,7 @@ def below(_, lanes, limit):
 
 @intrinsic
 def where_below(_, lanes, limit, value, other):
-    """``value`` where ``lanes`` are less than ``limit``, else ``other``; all lanes."""
+    """Return, for each lane, ``value`` if ``lanes`` is less than ``limit``, else ``other``; all arguments are lanes."""
 
     def generate(__, builder, ___, arguments):
         return builder.select(builder.fcmp_ordered("<", arguments[0], arguments[1]), arguments[2], arguments[3])
@@ -266,7 +265,7 @@ def where_below(_, lanes, limit, value, other):
 
 @intrinsic
 def count_bits(_, bits):
-    """Number of bits that are set in an unsigned integer."""
+    """Return the number of bits that are set in an unsigned integer."""
 
     def generate(__, builder, ___, arguments):
         return _call(builder, "llvm.ctpop.i64", ir.IntType(64), arguments)
@@ -276,7 +275,7 @@ def count_bits(_, bits):
 
 @intrinsic
 def lowest_bit(_, bits):
-    """Place of the lowest bit that is set; 64 if none is."""
+    """Return the index of the lowest bit that is set; 64 for zero."""
 
     def generate(__, builder, ___, arguments):
         return _call(builder, "llvm.cttz.i64", ir.IntType(64), [arguments[0], ir.IntType(1)(0)])
@@ -286,7 +285,7 @@ def lowest_bit(_, bits):
 
 @intrinsic
 def highest_bit(_, bits):
-    """Place of the highest bit that is set; -1 if none is."""
+    """Return the index of the highest bit that is set; -1 for zero."""
 
     def generate(__, builder, ___, arguments):
         zeros = _call(builder, "llvm.ctlz.i64", ir.IntType(64), [arguments[0], ir.IntType(1)(0)])

@@ -1,8 +1,8 @@
-"""Functions that a scene names: found and read when the scene is loaded, run when it is simulated.
+"""Functions that a scene names; their files are read when the scene is loaded and run when it is simulated.
 
-A scene names a function as ``file.py:function``, in a file beside it or below its folder, or by the name of an
-installed entry point. A Python program may give the function itself. No other module is imported: a scene is data that
-somebody may have sent. The text of a file is that of the moment at which the scene was loaded.
+A scene names a function as ``file.py:function``, in a file in the folder of the scene or below, or by the name of an
+installed entry point. A Python program may pass the function itself. No other module is imported, because a scene may
+come from another person. The text of a file is the text at the time at which the scene was loaded.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from wrcore.errors.checked_yaml import GIVEN
 from wrcore.errors.input_files import check_regular
 
 GROUP = "wrcore.laws"
-"""Entry points of laws that installed packages offer; creep laws have a group of their own."""
+"""Group of the entry points of laws in installed packages; creep laws have another group."""
 
 _KNOWN: dict[tuple[int, ...], Any] = {}
 _TEXTS: dict[ModuleType, str] = {}
@@ -32,7 +32,7 @@ _PRESENT: ContextVar["Laws | None"] = ContextVar("present", default=None)
 
 
 class LawFile(NamedTuple):
-    """A function in a file, which is read and not run."""
+    """Function in a file that has been read but not run."""
 
     path: str
     content: bytes
@@ -40,15 +40,15 @@ class LawFile(NamedTuple):
 
 
 class UserFunction(NamedTuple):
-    """A function of the user."""
+    """Name and digest of a function of the user."""
 
     name: str
     digest: tuple[int, ...]
-    """Of its name and its text, as four numbers: models hold them in its place."""
+    """Digest of name and text as four numbers, which models hold instead of the function."""
 
     @property
     def function(self) -> Callable:
-        """The function itself; the file that holds it is run when it is first asked for."""
+        """The function itself; its file is run at the first access."""
         known = _KNOWN[self.digest]
         if isinstance(known, LawFile):
             known = _KNOWN[self.digest] = _function_in(known)
@@ -56,24 +56,24 @@ class UserFunction(NamedTuple):
 
     @property
     def sha256(self) -> str:
-        """The digest in 64 hex digits."""
+        """Digest as 64 hex digits."""
         return np.array(self.digest, np.int64).tobytes().hex()
 
 
 class Laws:
-    """The laws that a scene names, by the text that names them.
+    """Laws of a scene, by the texts that name them.
 
     Parameters
     ----------
     *folders : Path
-        Files lie in one of them, or below it.
+        Folders that contain the files of laws, also in subfolders.
     asked : iterable of str
-        Laws that a person named in this very call: their files also count from the working directory, and may lie
-        anywhere.
+        Laws that the user named in the present call: their paths may also be relative to the working directory, and
+        their files may be in any folder.
     before : mapping, optional
-        Sources that were read before, by text: they are not read anew.
+        Sources that have already been read, by text; they are not read again.
     trusted : bool
-        False for a scene that a file of results holds: its laws are not run.
+        False for a scene from a file of results: its laws are not run.
     """
 
     def __init__(
@@ -88,15 +88,16 @@ class Laws:
         self._before = dict(before or {})
 
     def find(self, law: str, group: str = GROUP) -> UserFunction:
-        """The law that a text names; an InputError without a source says what was expected."""
+        """Return the law that a text names; an InputError without a source states the expectation."""
         key = law if ":" in law else f"{law} of {group}"
         if key not in self.known:
             self.known[key] = self._before.get(key) or self._source_of(law, group)
         return _user_function(self.known[key])
 
     def beside(self, law: str, folder: Path) -> str:
-        """The text that names a law of a file in ``folder`` (a vehicle file say) with the absolute path of the law's
-        file; the text as it is if the law is in no file there."""
+        """Return the name of a law with the absolute path of its file in ``folder``, the folder of a vehicle file say.
+
+        The name is returned unchanged if there is no such file."""
         place, _, name = law.rpartition(":")
         path = _file_below(place, folder) if place.endswith(".py") else None
         if path is None:
@@ -108,20 +109,20 @@ class Laws:
 
     @property
     def files(self) -> dict[str, str]:
-        """SHA-256 of the files that hold laws, by path."""
+        """SHA-256 of the files with laws, by path."""
         files = [source for source in self.known.values() if isinstance(source, LawFile)]
         return {file.path: hashlib.sha256(file.content).hexdigest() for file in files}
 
     @property
     def digests(self) -> dict[str, str]:
-        """SHA-256 of each law, by the text that names it, without the folder of its file."""
+        """SHA-256 of each law, by its name without the folder of the file."""
         found: dict[str, set[str]] = {}
         for text, source in self.known.items():
             found.setdefault(text.replace("\\", "/").rpartition("/")[2], set()).add(_user_function(source).sha256)
         return {name: "+".join(sorted(each)) for name, each in found.items()}
 
     def allow(self) -> None:
-        """Refuse to run laws of a scene that is not trusted; the error has no source."""
+        """Raise an InputError without a source if the scene has laws and is not trusted."""
         if self.known and not self.trusted:
             named = ", ".join(sorted(self.digests))
             expected = f"expected trust=True (--trust) to run what this file names, code that may be anybody's: {named}"
@@ -129,7 +130,7 @@ class Laws:
 
     @contextmanager
     def present(self):
-        """Let `present_law` find these laws meanwhile."""
+        """Make `present_laws` return these laws during a block."""
         token = _PRESENT.set(self)
         try:
             yield self
@@ -154,7 +155,7 @@ class Laws:
         return _read(path.resolve(), name)
 
     def _installed(self, law, group):
-        """The function that an installed entry point names."""
+        """Return the function of an installed entry point."""
         entry = entry_named(group, law, self.trusted)
         if entry is None:
             raise InputError("", "", f"{_EXPECTED.format(group=group)}, got {law!r}")
@@ -168,13 +169,13 @@ _EXPECTED = (
 
 
 def present_laws() -> Laws:
-    """The laws of the scene that is being read; else those of the working directory."""
+    """Return the laws of the scene that is being read; else those of the working directory."""
     return _PRESENT.get() or Laws(Path())
 
 
 def entry_named(group: str, name: str, trusted: bool = True) -> Any:
-    """The installed entry point of a group and name, or None; an InputError without a source if it may not be run."""
-    from importlib.metadata import entry_points  # reads what is installed: some ten milliseconds
+    """Return an installed entry point, or None; an InputError without a source is raised if it may not be run."""
+    from importlib.metadata import entry_points  # reads the list of installed packages, about 10 ms
 
     entry = next((entry for entry in entry_points(group=group) if entry.name == name), None)
     if entry is not None and not trusted:
@@ -184,12 +185,12 @@ def entry_named(group: str, name: str, trusted: bool = True) -> Any:
 
 
 def loaded(entry: Any, group: str) -> Any:
-    """What an entry point names; an InputError without a source if it cannot be imported."""
+    """Import and return the object of an entry point; any error becomes an InputError without a source."""
     return guarded(f"the entry point {entry.name} of {group}", entry.load)
 
 
 def _user_function(source):
-    """`UserFunction` of a source."""
+    """Return the `UserFunction` of a source (a `LawFile` or a function) and register the source."""
     if isinstance(source, LawFile):
         name, content = source.name, source.content
     else:
@@ -198,13 +199,13 @@ def _user_function(source):
         content = f"{_text(module, source)}\0{_content(source, set())}".encode("utf-8", "surrogatepass")
     sha = hashlib.sha256(name.encode() + b"\0" + content).digest()
     digest = tuple(int(part) for part in np.frombuffer(sha, np.int64))
-    if not (isinstance(source, LawFile) and digest in _KNOWN):  # a function may hold objects that only look alike
+    if not (isinstance(source, LawFile) and digest in _KNOWN):  # equal digests may belong to different objects
         _KNOWN[digest] = source
     return UserFunction(name, digest)
 
 
 def _file_below(place, folder):
-    """Path of a file in a folder or below it, with all links followed; None if there is none."""
+    """Return the resolved path of a file in a folder or below it; None if there is no such file."""
     if not _is_file(folder / place):
         return None
     path = (folder / place).resolve()
@@ -212,7 +213,7 @@ def _file_below(place, folder):
 
 
 def _is_file(path):
-    return os.path.isfile(path)  # Path.is_file raises where a name is too long or a folder is closed
+    return os.path.isfile(path)  # Path.is_file raises for names that are too long and closed folders
 
 
 def _read(path, name):
@@ -224,7 +225,7 @@ def _read(path, name):
 
 
 def _function_in(file):
-    """The function of a file, whose text is run once in a process."""
+    """Return the function of a file; the file is run once in a process."""
     key = file.path, file.content
     if key not in _MODULES:
         stem = Path(file.path).stem
@@ -248,7 +249,7 @@ def _function_in(file):
 
 
 def _without_cache(function):
-    """Have numba compile a function from this text: files of machine code beside it may be of another one."""
+    """Disable the cache of a compiled function, because cached machine code may be that of another text of the file."""
     if hasattr(function, "py_func") and hasattr(function, "_cache"):
         from numba.core.caching import NullCache
 
@@ -256,39 +257,39 @@ def _without_cache(function):
 
 
 def guarded(what: str, load: Callable[[], Any]) -> Any:
-    """The result of a call that imports or runs a module; an InputError without a source for any error in it."""
+    """Return the result of a call that imports or runs a module; any error becomes an InputError without a source."""
     try:
         return load()
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever the module's code does
+    except BaseException as error:  # any error in the code of the module
         raise InputError("", "", f"expected a module that can be imported: {what}: {said(error)}") from None
 
 
 def said(error: BaseException) -> str:
-    """An error in one line."""
+    """Return type and message of an error in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split()).rstrip(": ")
 
 
 def text_digest(function: Any) -> tuple[int, ...]:
-    """Four numbers for a kernel of an installed package and the text of its module."""
+    """Return the digest, as four numbers, of a kernel of an installed package and of the text of its module."""
     return _user_function(getattr(sys.modules[function.__module__], function.__name__)).digest
 
 
 def function_of(digest: Iterable[int]) -> Callable:
-    """The function with a digest."""
+    """Return the function with a digest."""
     return UserFunction("", tuple(map(int, digest))).function
 
 
 def name_of(digest: Iterable[int]) -> str:
-    """File and name of the function with a digest."""
+    """Return file and name of the function with a digest."""
     plain = getattr(function_of(digest), "py_func", function_of(digest))
     code = getattr(plain, "__code__", None)
     return f"{Path(code.co_filename).name}:{plain.__name__}" if code else str(plain)
 
 
 def _text(module, function):
-    """What decides on a function: the text of its module as it was first read; in a notebook its own."""
+    """Return the text of a function's module as it was first read; in a notebook the source of the function."""
     if module not in _TEXTS:
         try:
             _TEXTS[module] = Path(module.__file__).read_text("utf-8")
@@ -296,13 +297,15 @@ def _text(module, function):
             try:
                 return inspect.getsource(getattr(function, "py_func", function))
             except (OSError, TypeError):
-                return ""  # its code still counts
+                return ""  # the digest still contains the code
     return _TEXTS[module]
 
 
 def _content(thing, seen):
-    """What a value is, or a function does, as text that another process finds, too: a function that is defined anew,
-    with another text or other globals, has another one. Functions of libraries stand by their names."""
+    """Return a text that represents a value or the code of a function, equal in all processes.
+
+    A function that is defined again with other code or other globals has another text. Functions of libraries are
+    represented by their names."""
     plain = getattr(thing, "py_func", thing)
     if isinstance(plain, FunctionType):
         name = f"{plain.__module__}.{plain.__qualname__}"
@@ -328,6 +331,6 @@ def _content(thing, seen):
 
 
 def _names(code):
-    """Names that code, and the code in it, takes from its globals."""
+    """Return the names that code, with nested code, may take from its globals."""
     inner = [one for one in code.co_consts if isinstance(one, CodeType)]
     return sorted({*code.co_names, *(name for one in inner for name in _names(one))})

@@ -1,9 +1,9 @@
-"""Functions of the user (`wrcore.kernels.named_laws`), called from kernels by address.
+"""Functions of the user (`wrcore.kernels.named_laws`) that kernels call by address.
 
-A function that numba compiled (``@numba.njit``) becomes part of the run's machine code. A plain Python function is
-called back by every evaluation that needs it, at some microseconds each. The first error in it ends the run: every
-later call in its thread returns NaN until the kernel has returned and `take_fault` is asked. The digest of a function
-stands in the model, in place of an address.
+A function compiled by numba (``@numba.njit``) becomes part of the machine code of the run. Each call of a plain Python
+function takes some microseconds. The first error in such a function ends the run: each later call in this thread
+returns NaN until the kernel has returned and `take_fault` is called. A model holds the digest of a function instead of
+its address.
 """
 
 import ctypes
@@ -25,23 +25,24 @@ from wrcore.kernels.jit import FUSED
 from wrcore.kernels.named_laws import function_of, name_of, said
 
 NOTHING = numba.types.none
-"""What a kernel returns that returns nothing."""
+"""Return type of a kernel that returns nothing."""
 
 GUARD = 64
-"""Numbers behind an array of a test call that a function must leave alone."""
+"""Count of guard numbers behind each array of a test call; a changed one shows that a function wrote outside."""
 
 MOST_SAMPLES = 400_000
-"""Of a function that is sampled."""
+"""Largest number of samples of a function."""
 
 _WATCHED = ContextVar("watched", default=False)
 _NOT_FINITE: dict[tuple[int, ...], None] = {}
-_NOTES: list[Any] = []  # what compiled code calls, kept alive
+_NOTES: list[Any] = []  # callbacks of compiled code, kept alive
 _HELD = threading.local()  # the error that a plain Python function raised in this thread
 
 
 def take_fault():
-    """Which plain Python function raised what in this thread since this was asked last; empty if none did. Ctrl-C in
-    one is raised."""
+    """Return and clear the error of a plain Python function in this thread: its name and the error as text.
+
+    The text is empty if there was no error. A KeyboardInterrupt is raised again."""
     name, error = getattr(_HELD, "fault", ("", None))
     _HELD.fault = "", None
     if isinstance(error, KeyboardInterrupt):
@@ -50,13 +51,14 @@ def take_fault():
 
 
 def fault_in(evaluate, *arguments):
-    """What went wrong in functions of the user while a kernel ran outside of a run, or an empty string; it is also
-    said once on standard error."""
+    """Call a kernel outside a run and return the error in functions of the user as text, empty if there was none.
+
+    The error is also printed once on standard error."""
     fault = ""
-    take_fault()  # of a kernel that nobody asked about
+    take_fault()  # clear an error of an earlier kernel
     try:
         evaluate(*arguments)
-    except Exception as error:  # of a compiled function
+    except Exception as error:  # raised in a compiled function
         fault = f"a law raised {said(error)}"
     fault = take_fault() or fault
     if fault:
@@ -65,11 +67,12 @@ def fault_in(evaluate, *arguments):
 
 
 def tried(own, sizes, *arguments, reads=0):
-    """What a function returns on a test call with arrays of these ``sizes``, one behind another, after the numbers
-    ``arguments``; beside it the arrays. Values may be given in place of a size. The first ``reads`` arrays are the
-    function's to read. An InputError without a source for an error in it, or a number written where it may not be."""
+    """Call a function for a test with numbers ``arguments`` and arrays of ``sizes``; return its result and the arrays.
+
+    A size may also be a list of values. The first ``reads`` arrays are read-only. An InputError without a source is
+    raised for an error in the function, and for a write outside the arrays or into read-only arrays."""
     function = own.function
-    for call in (getattr(function, "py_func", function), function):  # compiled code looks at no index
+    for call in (getattr(function, "py_func", function), function):  # only plain Python checks indices
         arrays, memory = [], []
         for size in sizes:
             values = np.zeros(size) if np.ndim(size) == 0 else np.array(size, float)
@@ -85,28 +88,29 @@ def tried(own, sizes, *arguments, reads=0):
 
 
 def called(what, function, *arguments):
-    """What a function of the user returns; any error in it but Ctrl-C is an InputError without a source, which says
-    ``what`` was expected of the function."""
+    """Call a function of the user and return its result.
+
+    Any error except KeyboardInterrupt becomes an InputError without a source; ``what`` is the expected behaviour."""
     try:
         return function(*arguments)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever the function does, which may be to end the process
+    except BaseException as error:  # any error, also SystemExit
         raise InputError("", "", f"expected a function that {what}: {said(error)}") from None
 
 
 def is_number(value):
-    """Whether a value is one real number, neither an array nor a truth value."""
+    """Whether a value is a real number, not an array and not a boolean."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
 def is_force(answer):
-    """Whether a law of an element may return this: a number, or a tuple of three."""
+    """Whether a value is a valid result of a law of an element: a number, or a tuple of three numbers."""
     return is_number(answer) or (isinstance(answer, tuple) and len(answer) == 3 and all(map(is_number, answer)))
 
 
 def finite(*values):
-    """Raise an InputError without a source where a test call left something not finite."""
+    """Raise an InputError without a source if results of a test call are not finite numbers."""
     try:
         good = all(np.isfinite(np.asarray(value, float)).all() for value in values)
     except (TypeError, ValueError):
@@ -116,7 +120,7 @@ def finite(*values):
 
 
 def sample(own, s, rows):
-    """Values (rows, n) of a function of arc length or speed ``s`` (n,), which may give (n,) for all rows."""
+    """Return the values (rows, n) of a function of arc length or speed ``s`` (n,); a result (n,) is used for all rows."""
     found = called("works on an array", own.function, s.copy())
     found = called("returns numbers", np.asarray, found)
     if found.dtype.kind not in "fiu":
@@ -129,9 +133,10 @@ def sample(own, s, rows):
 
 
 def on_grid(spec, rows, laws, source, field, call=True):
-    """Abscissas (n,) from ``begin`` (0 if left out) on over a ``length`` by a ``spacing``, keys of ``spec``, and the
-    values (rows, n) of its ``law`` there, which ``laws`` finds; None where it is not to be called. An InputError names
-    ``source`` and ``field``."""
+    """Return abscissas (n,) of a grid and the values (rows, n) of a law at these points; None unless ``call``.
+
+    The keys of ``spec`` are ``begin`` (default 0), ``length`` and ``spacing`` of the grid, and ``law``, a name that
+    ``laws`` finds. An InputError names ``source`` and ``field``."""
     count = round(spec["length"] / spec["spacing"]) + 1
     if not 2 <= count <= MOST_SAMPLES:
         raise InputError(source, f"{field}.spacing", f"expected 2 to {MOST_SAMPLES} samples, got {count}")
@@ -147,8 +152,9 @@ def on_grid(spec, rows, laws, source, field, call=True):
 
 
 def not_finite_in(evaluate):
-    """Names of the functions that give numbers that are not finite for finite ones while ``evaluate`` is called, which
-    asks for their addresses (`addressed`) anew."""
+    """Return the names of users' functions that return non-finite numbers for finite arguments during ``evaluate``.
+
+    ``evaluate`` must request the addresses of the functions again (`addressed`)."""
     _NOT_FINITE.clear()
     token = _WATCHED.set(True)
     try:
@@ -159,8 +165,9 @@ def not_finite_in(evaluate):
 
 
 def _note_of(digest, watched):
-    """Kernel that takes note where a function makes of ``given`` that is finite what is not; where nobody watches, one
-    that does nothing."""
+    """Return a kernel that records a function with finite ``given`` and non-finite ``found``.
+
+    Unless ``watched``, the kernel does nothing."""
     if not watched:
         return uncached(lambda given, found: None)
     back = ctypes.CFUNCTYPE(None, ctypes.c_int64)(lambda _: _NOT_FINITE.update({digest: None}))
@@ -175,15 +182,17 @@ def _note_of(digest, watched):
 
 
 def addressed(wrap, digest, scalars, arrays, examples, returns):
-    """The `Kernel` that ``wrap`` makes of the function with a digest and of what takes note of its results, for
-    ``examples`` (`Example`); plain Python is called back with so many ``scalars``, then ``arrays``."""
-    if planned() is not None:  # no file keeps them
+    """Return the `Kernel` that ``wrap`` makes of the function with a digest, for ``examples`` (`Example`).
+
+    ``wrap`` also gets the kernel that records non-finite results. The function has ``scalars`` numbers and ``arrays``
+    arrays as arguments."""
+    if planned() is not None:  # these kernels are not stored in the cache
         return NotCompiled
     return _addressed(wrap, digest, function_of(digest), scalars, arrays, examples, returns, _WATCHED.get())
 
 
 class NotCompiled:
-    """In place of a `Kernel` that is only `planned`."""
+    """Substitute for a `Kernel` whose compilation is only `planned`."""
 
     address = 0
 
@@ -193,7 +202,7 @@ def _addressed(wrap, digest, function, scalars, arrays, examples, returns, watch
     if not hasattr(function, "py_func"):
         function = _called_back(function, name_of(digest), scalars, arrays)
     try:
-        if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller
+        if arrays:  # else its caller compiles it, without allocation
             function.compile(signature_of(scalars, arrays))
         kernel = uncached(wrap(function, _note_of(digest, watched)))
         return Kernel(kernel, *(example.value for example in examples), returns=returns)
@@ -204,19 +213,19 @@ def _addressed(wrap, digest, function, scalars, arrays, examples, returns, watch
 
 
 def signature_of(scalars, arrays):
-    """Types of so many numbers and arrays."""
+    """Return the types of ``scalars`` numbers and ``arrays`` arrays."""
     return (numba.float64,) * scalars + (numba.types.Array(numba.float64, 1, "C"),) * arrays
 
 
 def uncached(function):
-    """A kernel around an own function, which no file keeps; it allocates nothing, see `wrcore.kernels.jit.jit`."""
+    """Compile a kernel without cache and without allocation (see `wrcore.kernels.jit.jit`), for users' functions."""
     return numba.njit(
         function, error_model="numpy", fastmath=FUSED, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False
     )
 
 
 class Example:
-    """An example argument, known by its type."""
+    """An example argument; examples of one type are equal."""
 
     def __init__(self, value):
         self.value, self._type = value, str(numba.typeof(value))
@@ -229,8 +238,9 @@ class Example:
 
 
 def _called_back(function, name, scalars, arrays):
-    """Plain Python as a compiled function of ``scalars`` numbers and arrays that returns three numbers; the last array
-    (of an element) or the last two (of a control) are the function's to write."""
+    """Return a compiled function that calls plain Python with numbers and arrays and returns three numbers.
+
+    The function may write into the last array (element) or the last two arrays (control law)."""
     word, number, reads = ctypes.c_size_t, ctypes.c_double, arrays - 1 if arrays == 3 else arrays - 2
 
     @ctypes.CFUNCTYPE(None, word, *[number] * scalars, *[word, ctypes.c_ssize_t] * arrays)
@@ -248,13 +258,13 @@ def _called_back(function, name, scalars, arrays):
         for array in (found, *given[reads:]):
             array[:] = np.nan
 
-    if arrays == 3:  # of an element: stretch, speed; states, parameters, rates
+    if arrays == 3:  # law of an element: stretch, speed; states, parameters, rates
 
         def call(stretch, speed, a, b, c):
             found = np.zeros(3)
             back(found.ctypes.data, stretch, speed, a.ctypes.data, a.size, b.ctypes.data, b.size, c.ctypes.data, c.size)
             return found[0], found[1], found[2]
-    else:  # of a control: time; inputs, states, parameters, outputs, following
+    else:  # control law: time; inputs, states, parameters, outputs, following
 
         def call(t, a, b, c, d, e):
             found = np.zeros(3)
@@ -267,7 +277,7 @@ def _called_back(function, name, scalars, arrays):
 
 
 def _answer_of(answer, handed, of_element):
-    """Force, stored energy and dissipated power of an element's answer; a force alone stores nothing."""
+    """Return force, stored energy and dissipated power from the result of a law; a force alone stores no energy."""
     if not of_element:
         if answer is not None:
             raise TypeError(f"expected a function that returns nothing, got {short(answer)}")

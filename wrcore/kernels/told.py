@@ -1,4 +1,4 @@
-"""What is said of work that takes long, and of what goes wrong where nothing can be raised."""
+"""Messages about long computations, and about errors in functions that are called by kernels and cannot raise."""
 
 import _thread
 import os
@@ -10,25 +10,25 @@ from threading import Timer
 from wrcore.kernels.cache import warn
 
 _AFTER = 0.2
-"""Ctrl-C in a call from a kernel is said again so much later, s: after the call, however busy the machine is."""
+"""Delay after which a Ctrl-C during a call from a kernel is raised again, s: after the call even on a busy machine."""
 
 PATIENCE = 3.0
-"""Work takes this long before it says so, s."""
+"""Duration of a computation after which wrcore prints a message, s."""
 
 
 _REACHED = ContextVar("reached", default=str)
 
 _again: list[Timer] = []
-"""Of Ctrl-C that is to be said again."""
+"""Timers of Ctrl-C that will be raised again."""
 
 
 def interrupted():
-    """Whether Ctrl-C in a call from a kernel is still to be said again: nothing is begun any more."""
+    """Whether a Ctrl-C during a call from a kernel has not yet been raised again; no new work may start then."""
     return any(timer.is_alive() for timer in _again)
 
 
 def raise_interrupted():
-    """Say it again, now that the kernel has returned."""
+    """Raise KeyboardInterrupt if a Ctrl-C is waiting; to be called after the kernel has returned."""
     waits = interrupted()
     while _again:
         _again.pop().cancel()
@@ -38,8 +38,10 @@ def raise_interrupted():
 
 @contextmanager
 def handed_on(outcome):
-    """Around what a kernel calls, which can raise nothing: say later what went wrong, Ctrl-C once more, after the call,
-    all else in a line, with its ``outcome``."""
+    """Catch errors in a function that a kernel calls and that cannot raise.
+
+    A Ctrl-C is raised again after the call. Any other error is printed in one line, with its consequence
+    ``outcome``."""
     try:
         yield
     except KeyboardInterrupt:
@@ -56,7 +58,7 @@ def _silent():
 
 @contextmanager
 def reaching(reached):
-    """Let what is said of long work in this thread end with the text that ``reached()`` returns: how far the run is."""
+    """Append the text of ``reached()``, the progress of the run, to messages of this thread during a block."""
     before = _REACHED.set(reached)
     try:
         yield
@@ -65,19 +67,21 @@ def reaching(reached):
 
 
 def reached_so_far():
-    """The function of this thread's `reaching`; without one it returns an empty text."""
+    """Return the function that `reaching` has set in this thread; by default one that returns an empty text."""
     return _REACHED.get()
 
 
 def tell(text):
-    """Say a line of how far work has come; none with ``WRCORE_PROGRESS=0``."""
+    """Print a line about the progress of work; nothing with ``WRCORE_PROGRESS=0``."""
     if not _silent():
         warn(text)
 
 
 @contextmanager
 def say_if_long(text, spent=0.0):
-    """Say a line once what is done takes long, with the time ``spent`` before (s); none with ``WRCORE_PROGRESS=0``."""
+    """Print a line if a block takes longer than `PATIENCE`, including the time ``spent`` before (s).
+
+    Nothing is printed with ``WRCORE_PROGRESS=0``."""
     if _silent():
         yield
         return
@@ -92,5 +96,5 @@ def say_if_long(text, spent=0.0):
 
 @cache
 def warn_once(text):
-    """Say a line, once in a process."""
+    """Print a warning at most once in a process."""
     warn(text)
