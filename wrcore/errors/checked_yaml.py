@@ -270,8 +270,9 @@ def check(data, schema, source, above=""):
 def plain_tree(data, source):
     """Return a copy of nested data with types of JSON only; paths and functions become text.
 
-    An InputError is raised for keys that are not text, dates, bytes, sets, numbers that are infinite, NaN or too large,
-    text that is not Unicode, data that contain themselves, and data with more than `MOST_VALUES` values.
+    An InputError is raised for keys that are not text, and for values that JSON cannot represent: dates, bytes, sets,
+    infinite, NaN or too large numbers, and text that is not Unicode. It is also raised for data that contain themselves
+    and for data with more than `MOST_VALUES` values.
     """
     left = MOST_VALUES
 

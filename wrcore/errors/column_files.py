@@ -72,7 +72,7 @@ class ColumnFile(NamedTuple):
                         raise self.fault(row, len(columns), expected) from None
                     table[row, k] = math.nan
                 commas = (cell, row) if "," in cell else commas
-                points = cell if "." in cell and cell in self.texts[row] else points  # not a point from a reader
+                points = cell if "." in cell and cell in self.texts[row] else points  # a point of the file itself
         if commas and points:
             expected = f"expected one decimal mark in a file, got {commas[0]} and {points}"
             raise InputError(self.path, f"line {self.lines[commas[1]]}", expected)

@@ -31,7 +31,7 @@ QUANTITIES = (
 )  # fmt: skip
 """Channels that a control law may measure; ``Controls.inputs`` holds an index of this tuple."""
 
-PITCH, SPEEDS, TURNS, ROLLING = 5, 6, 9, 12  # last angle, first velocity, angular velocity, rolling rate
+PITCH, SPEEDS, TURNS, ROLLING = 5, 6, 9, 12  # last angle; first velocity, angular velocity, rolling rate
 
 WHAT, BODY, NEAR, APART = range(4)
 """Columns of ``Controls.inputs``: quantity, body, wheelset near the body, difference of rolling rates."""
@@ -229,7 +229,7 @@ def take_samples(model, t, state, work, taking):
         if period == 0.0:
             continue
         count = state[row[SAMPLES]]
-        if t >= (count - EARLY) * period or t < (count - 1.0 - EARLY) * period:  # or time was reset
+        if t >= (count - EARLY) * period or t < (count - 1.0 - EARLY) * period:  # or time went back
             sampling[DUE] = 1.0
             count = math.floor(t / period + EARLY) + 1.0
             if taking:

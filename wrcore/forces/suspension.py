@@ -5,9 +5,9 @@ once in the axes of j. With rotation matrices A, positions r, velocities v and a
 
     R = Aj^T Ai,  rho = Aj^T (ri - rj),  u = Aj^T (vi - vj - wj x (ri - rj)),  W = Aj^T (wi - wj).
 
-The distance vector of a marker m of i from a marker n of j is d = rho + R m - n, its rate is d' = u + W x R m. A force
-F on i acts at the marker of i, and -F acts on j at this point. The pair gains no angular momentum and, without dampers,
-no energy: F = -dU/dd is exactly the force of a spring with the energy U(d), in the axes of j. The moment of rotation
+The vector from a marker n of j to a marker m of i is d = rho + R m - n. Its rate is d' = u + W x R m. A force F on i
+acts at the marker of i, and -F acts on j at this point. The pair gains no angular momentum and, without dampers, no
+energy: the force of a spring with the energy U(d) is exactly F = -dU/dd in the axes of j. The moment of rotation
 stiffnesses (kx, ky, kz) about the axes of j is likewise that of the energy
 
     U(R) = c . (1 - diag R),   cx = (ky + kz - kx)/2 and so on,

@@ -12,8 +12,8 @@ releases that were tested.
 
 jit       ``njit(_nrt=False)``: no reference counts in kernels that create no arrays; ``forceinline``;
           ``numba.np.linalg.ensure_blas``, which imports scipy.linalg for ``numba.np.arraymath``
-forms     ``JITCodeLibrary`` makes machine code in ``_finalize_final_module`` alone; ``flags.no_compile``,
-          ``NativeLowering``, ``insert_user_function``; dispatchers ask for other kernels by ``get_call_template`` and
+forms     ``JITCodeLibrary`` makes machine code in ``_finalize_final_module`` only; ``flags.no_compile``,
+          ``NativeLowering``, ``insert_user_function``; dispatchers request other kernels by ``get_call_template`` and
           ``get_overload``; ``CompileResultCacheImpl`` and its form of a library, ``FunctionCache._index_key`` and
           ``_load_overload``, ``rtsys``; ``numba.config.CACHE_DIR`` read when a cache is made; ``cached_internal_func``
           of a compiler's ``targetctx`` holds numba's helpers

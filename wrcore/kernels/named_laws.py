@@ -175,7 +175,7 @@ def present_laws() -> Laws:
 
 def entry_named(group: str, name: str, trusted: bool = True) -> Any:
     """Return an installed entry point, or None; an InputError without a source is raised if it may not be run."""
-    from importlib.metadata import entry_points  # reads the list of installed packages, about 10 ms
+    from importlib.metadata import entry_points  # reads the list of installed packages, about ten milliseconds
 
     entry = next((entry for entry in entry_points(group=group) if entry.name == name), None)
     if entry is not None and not trusted:

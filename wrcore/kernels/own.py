@@ -120,7 +120,9 @@ def finite(*values):
 
 
 def sample(own, s, rows):
-    """Return the values (rows, n) of a function of arc length or speed ``s`` (n,); a result (n,) is used for all rows."""
+    """Return the values (rows, n) of a function of arc length or speed ``s`` (n,).
+
+    If the function returns an array (n,), this array is used for all rows."""
     found = called("works on an array", own.function, s.copy())
     found = called("returns numbers", np.asarray, found)
     if found.dtype.kind not in "fiu":
