@@ -1,1 +1,1 @@
-"""From a wheel's position and velocity to the forces of the rails on it: one file for each model of contact."""
+"""Forces of the rails on a wheel from its position and velocity: one file for each contact model."""

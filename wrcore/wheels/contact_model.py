@@ -1,4 +1,4 @@
-"""Everything that turns a wheelset's motion into contact forces, as one record for kernels; counters of evaluations."""
+"""`ContactModel`: all data from which kernels compute contact forces, as one record. Counters of evaluations."""
 
 from typing import NamedTuple
 
@@ -13,16 +13,17 @@ from wrcore.kernels.handles import other_at
 from wrcore.kernels.jit import jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
-"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
-pair's table that were solved instead of looked up, patches on fixed strips, whose tips were not found, and patches of
-the surrogate far outside the range of its training."""
+"""Indices of the counters, in this order: evaluations of the equations, interpolations outside the creep table's range,
+patches solved on a grid, patches solved because the pair's table does not contain them, patches on fixed strips (their
+tips were not found), and surrogate patches far outside the range of its training."""
 
 
 COUNTERS = 6
+"""Number of counters."""
 
 
 class ContactModel(NamedTuple):
-    """Everything that turns a wheelset's motion into contact forces, for kernels."""
+    """Data from which kernels compute the contact forces of a wheelset from its motion."""
 
     geometry: ContactGeometry
     hertz: HertzTable
@@ -34,41 +35,42 @@ class ContactModel(NamedTuple):
     shear_modulus: float  # G, Pa
     poisson_ratio: float
     friction: float
-    """Coulomb's mu at no slip; of rails that differ, or along which it changes, the largest one."""
-    damping: float  # c_e of Eq. (7)'s damping factor; 1 means none
+    """Coefficient of friction mu at zero slip; its maximum where the rails differ or where it changes along them."""
+    damping: float  # c_e of the damping factor in Eq. (7); 1 means no damping
     damping_speed: float  # v0 of the damping factor, m/s
-    least_speed: float  # rolling speed is not taken smaller than this in creepages, m/s
-    strips: StripModel  # patches on strips, if the scene asks for them
-    friction_ratio: float = 1.0  # A: friction at large slip velocity over that at none; 1: it does not fall
+    least_speed: float  # lower bound of the rolling speed by which creepages are divided, m/s
+    strips: StripModel  # patches on strips, if the scene has them
+    friction_ratio: float = 1.0  # A: friction at large slip velocity over friction at zero slip; 1: constant friction
     friction_decay: float = 0.0  # B: rate at which friction falls with slip velocity, s/m
     geometries: tuple = ()
-    """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
+    """`ContactGeometry` of each wheel (left and right, wheelset by wheelset), if wheels or rails differ; else empty."""
     plain: tuple = ()
-    """Where rails change along the track: the `ContactGeometry` of each wheel where they do not."""
+    """`ContactGeometry` of each wheel on the unchanged rail section, if rails change along the track; else empty."""
     wheels: np.ndarray = np.zeros(0, np.int64)
-    """The same as `Handles` of contact models, see `wrcore.equations.kernels.with_wheels`."""
-    friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
+    """`Handles` of each wheel's contact model, if wheels or rails differ; see
+    `wrcore.equations.kernels.with_wheels`."""
+    friction_factors: np.ndarray = np.zeros(0)  # (n,): samples of a user's friction law, see `falling`
     surrogate: Surrogate = no_surrogate()
-    """Trained network of exact contact, if the scene asks for it."""
+    """Trained network that replaces exact contact, if the scene has one."""
 
 
 def without_wheels(contact, **more):
-    """A `ContactModel` without what its wheels have of their own, and ``more`` in it."""
+    """Return the `ContactModel` without its wheel-specific data, and with the fields ``more`` replaced."""
     return contact._replace(geometries=(), plain=(), wheels=np.zeros(0, np.int64), **more)
 
 
 @jit(allocates=False, inline="always")
 def contact_of(model, wheelset, wheel):
-    """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
+    """Return the contact model of a wheel (0 left, 1 right): wheel-specific if wheels or rails differ, else common."""
     return other_at(model, model.wheels[2 * wheelset + wheel] if len(model.wheels) > 0 else 0)
 
 
 @jit(allocates=False, forceinline=True)
 def is_elliptic(contact):
-    """Whether the patches of a `ContactModel` are ellipses."""
+    """Whether a `ContactModel` represents contact patches by Hertzian ellipses."""
     return not contact.strips.strips and len(contact.surrogate.median) == 0
 
 
 def shaped(contact):
-    """Whether a `ContactModel` asks for the shape numbers of its patches."""
+    """Whether a `ContactModel` has a creep table that depends on the shape numbers of its patches."""
     return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and is_elliptic.py_func(contact)

@@ -1,8 +1,9 @@
-"""Wrench of the rails on wheelsets with the real patch: contact on strips in place of an ellipse.
+"""Force and moment of the rails on wheelsets from exact, non-elliptic contact patches on strips.
 
-The normal and the rolling problem are solved on Galerkin strips (:mod:`wrcore.contact.patch.solution`), of a wheel that
-the damping has lifted (:mod:`wrcore.wheels.normal_damping`). Where strips do not converge a uniform grid takes over
-(counted). A right wheel is solved as the mirror image of a left one: no choice can tell them apart.
+The normal and the rolling problem are solved on Galerkin strips (:mod:`wrcore.contact.patch.solution`), after the
+damping has lifted the wheel (:mod:`wrcore.wheels.normal_damping`). If the strips do not converge, the patch is solved
+on a uniform grid and counted. A right wheel is solved as the mirror image of a left one, so both sides are treated
+identically.
 """
 
 import math
@@ -28,14 +29,15 @@ from wrcore.wheels.motion import as_left, motion_of
 from wrcore.wheels.normal_damping import lift_of, lifted
 
 UNSOLVED, STOOD_IN, ROWLESS = range(3)
-"""Places of `StripWork.flags`: not 0 where what a table does not have is not to be solved; once ellipses have stood in;
-where no rows are wanted (`BARE`)."""
+"""Indices of `StripWork.flags`. Not 0 if, in this order: patches outside the table must not be solved; ellipses have
+replaced strips at least once; no rows are filled (`BARE`)."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _deepest_slip(model, m, pose, frame, depth):
-    """Creepages of a patch's deepest material point, and coefficient of friction. The motion ``m`` is in axes that lean
-    as the patch does."""
+    """Return the creepages at the material point of maximum penetration, and the coefficient of friction there.
+
+    The motion ``m`` is in the inclined axes of the patch."""
     speed = max(abs(m.vx), model.least_speed)
     py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
     pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
@@ -46,7 +48,7 @@ def _deepest_slip(model, m, pose, frame, depth):
 
 @jit(allocates=False, forceinline=True)
 def copy_deepest(rows, first, last, out):
-    """Fill ``out`` with the deepest of the rows."""
+    """Copy the row of maximum penetration, from ``first`` to before ``last``, into ``out``."""
     deepest = first
     for k in range(first + 1, last):
         deepest = k if rows[k, reduction.PENETRATION] > rows[deepest, reduction.PENETRATION] else deepest
@@ -55,8 +57,10 @@ def copy_deepest(rows, first, last, out):
 
 @jit(allocates=False, fastmath=FUSED, nogil=True)
 def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
-    wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
+    """Solve the overlaps from ``first`` to before ``last`` as one contact patch of a left wheel.
+
+    Fills the patch's row ``out``, adds its force and moment to ``wrench`` and returns its `Solution`. The normal force
+    ``out[NORMAL]`` is 0 if the lifted wheel has no contact."""
     speed, windows = max(abs(m.vx), model.least_speed), 0
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     frame = frame_of_rows(rows, first, last)
@@ -84,7 +88,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
         share = finer[WEIGHT]
         fixed = finer[FIXED]
         found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work)
-        if share > 0.0:  # the mean with more strips
+        if share > 0.0:  # weighted mean with the solution on a larger number of strips
             finer[WIDENED] = BLENDING_RATIO
             windows, frame = solve_overlaps(model, pose, low, high, memory, work)
             finer[WIDENED] = 1.0
@@ -110,13 +114,13 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
 
 @jit(allocates=False)
 def add_group(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """`group_wrench` for who calls it by its address."""
+    """Add the force and moment of one group of overlaps to ``wrench``: `group_wrench` for calls by address."""
     group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 
 @jit(allocates=False)
 def mirror(rows, count, wrench):
-    """Patches and wrench of a left wheel as those of a right one."""
+    """Mirror the patches and the wrench of a left wheel to those of a right wheel, in place."""
     for k in (1, 3, 5):
         wrench[k] = -wrench[k]
     for i in range(count):
@@ -129,7 +133,7 @@ def mirror(rows, count, wrench):
 
 @jit(allocates=False)
 def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode):
-    """`wheel_wrenches`, called by its address: few runs need it."""
+    """Fill the wrenches from Hertzian ellipses by `wheel_wrenches`, compiled on first use as few runs need it."""
     late, work.flags[STOOD_IN] = model.strips.late, 1.0
     if late[WITH_ELLIPSES] == 0:
         call_c(late[LOAD], WITH_ELLIPSES)
@@ -141,8 +145,10 @@ def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters,
 
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
-    """As `wheel_wrenches`, with patches on strips; arguments as there. Ellipses stand in for what is solved, not for
-    what a table has."""
+    """Fill the forces and moments of the rails on all wheels from patches on strips.
+
+    Arguments are those of `wrcore.wheels.hertzian_force.wheel_wrenches`. In the mode `ELLIPSES`, ellipses replace the
+    patches that would be solved; patches within a table are interpolated."""
     rough = mode & ELLIPSES > 0
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)

@@ -1,4 +1,4 @@
-"""What all models of contact share on the way from a wheel's motion to its forces."""
+"""Steps from a wheel's motion to its contact forces that are common to all contact models."""
 
 import math
 
@@ -11,7 +11,7 @@ from wrcore.wheels.motion import WheelMotion
 
 @jit(allocates=False, forceinline=True)
 def press_wheels(model, work, mode):
-    """Find the wrenches of the rails on all wheels for their motions in ``work``, by the model's kernel."""
+    """Compute forces and moments of the rails on all wheels from the motions in ``work``, by the model's kernel."""
     call_address(
         model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, work.strips, mode,
@@ -20,7 +20,9 @@ def press_wheels(model, work, mode):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def detect_patches(model, m, rows):
-    """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
+    """Fill ``rows`` with the contact patches of a wheel by the model's detection.
+
+    Returns the number of patches, the error bound of planar detection (m; 0 unless detection is AUTO), and whether
     detection was spatial."""
     bound, spatial = 0.0, model.detection == SPATIAL
     ex, ey, ez = m.side * m.ex, m.side * m.ey, m.side * m.ez
@@ -34,8 +36,10 @@ def detect_patches(model, m, rows):
 @jit(allocates=False, forceinline=True)
 def falling(model, friction, xi, eta, speed):
     """Coefficient of friction mu0 ((1 - A) exp(-B w) + A) at the slip velocity w of a patch (Polach, Wear 258 (2005)
-    992): that of its reference point, without spin; or mu0 times a factor of a user's own, samples of which lie 1/B
-    apart."""
+    992).
+
+    The slip velocity is that of the patch's reference point, without spin. With a user's friction law, mu0 is
+    multiplied by a factor interpolated between samples at intervals of 1/B."""
     ratio = model.friction_ratio
     if ratio == 1.0:
         return friction
@@ -50,7 +54,7 @@ def falling(model, friction, xi, eta, speed):
 
 @jit(allocates=False, forceinline=True)
 def leaning_motion(geometry, m, lean):
-    """The motion with velocities in axes that lean so, see `lean_at`."""
+    """Return the motion with its velocities in axes inclined by ``lean``, see `wrcore.contact.search.strip.lean_at`."""
     if not changes_along(geometry):
         return m
     vx, vz = leaning(geometry, lean, m.vx, m.vz)

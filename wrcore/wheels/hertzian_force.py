@@ -1,4 +1,4 @@
-"""Wrench of the rails on a wheelset: detection, Hertz, creepages and creep force put together."""
+"""Force and moment of the rails on wheelsets from Hertzian ellipses: detection, normal force, creepage, creep force."""
 
 import math
 
@@ -16,7 +16,7 @@ from wrcore.wheels.motion import MOTION, motion_of
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed):
-    """`normal_contact`, and a/b and its logarithm."""
+    """Return normal force (N), semi-axes a and b (m) of the Hertz ellipse, a/b and ln(a/b); see `normal_contact`."""
     return loaded_ellipse(
         model.hertz, model.shear_modulus / (1.0 - model.poisson_ratio), model.damping, model.damping_speed, penetration,
         curvature_x, curvature_y, approach_speed,
@@ -25,19 +25,19 @@ def normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed)
 
 @jit(allocates=False, fastmath=FUSED)
 def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
-    """Normal force (N) by Eq. (7) and the semi-axes (m) of the Hertz ellipse that carries it."""
+    """Return the normal force (N) by Eq. (7) and the semi-axes (m) of its Hertz ellipse."""
     force, a, b, _, _ = normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed)
     return force, a, b
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def patch_wrench(model, m, bend_y, bend_z, row, psi):
-    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
+    """Force (N) and moment about the wheelset's centre (N m) of one patch, and whether the creep law's range was left.
 
-    The rail bends by the curvatures ``bend_y`` and ``bend_z``, if the patch does not know yet; ``psi`` is its shape
-    number, 0 for an ellipse; see `wrcore.wheels.shaped_force`. Creep laws and tables are
-    those of a wheel that rolls forward; one that rolls back is the mirror image of one that rolls forward with the
-    opposite spin. Below the least speed spin goes to and fro through zero, so that nothing jumps at standstill.
+    The curvatures ``bend_y`` and ``bend_z`` (1/m) of the rail's line are 0 if ``row`` already includes them. The shape
+    number ``psi`` is 0 for an ellipse, see `wrcore.wheels.shaped_force`. Creep laws and tables are those of a wheel
+    that rolls forward; a wheel that rolls backward is the mirror image of this with the opposite spin. Below the least
+    speed, spin is scaled by v / (least speed), so that forces are continuous at standstill.
     """
     px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
     cosine, sine = row[reduction.COSINE], row[reduction.SINE]
@@ -68,7 +68,9 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
 
 @jit(allocates=False, forceinline=True)
 def leaning_wrench(contact, m, bend_y, bend_z, row, psi):
-    """As `patch_wrench`, of a wheel's own contact model, with a patch that leans as the rail does under it."""
+    """Force and moment of one patch as by `patch_wrench`, in axes inclined along the track as the rail under the patch.
+
+    ``contact`` is the contact model of this wheel."""
     if not changes_along(contact.geometry):
         return patch_wrench(contact, m, bend_y, bend_z, row, psi)
     x, z = row[reduction.X], row[reduction.Z]
@@ -85,15 +87,15 @@ def leaning_wrench(contact, m, bend_y, bend_z, row, psi):
 
 @jit(allocates=False, fastmath=FUSED)
 def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
-    """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
+    """Fill the forces and moments of the rails on all wheels, and the wheels' patches, in frames with x along the rail.
 
     A row of ``motions`` (k, 2, 15), left and right, is a `WheelMotion`. Fills ``patches`` (k, 2, MAX_PATCHES,
-    PATCH_COLUMNS), rows beyond their ``counts`` keep old content; AUTO's ``bounds`` of planar detection's error (m);
-    ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's centre (N m). The ``mode`` is one of
-    `wrcore.wheels.modes`; ``work`` is for patches on strips.
+    PATCH_COLUMNS), in which rows beyond ``counts`` (k, 2) keep old content; ``bounds`` (k, 2) of the error of planar
+    detection (m; detection AUTO only); ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's centre (N m).
+    The ``mode`` is one of `wrcore.wheels.modes`; ``work`` is for patches on strips.
 
-    One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
-    chains of neighbours overlap.
+    The arithmetic of one wheel is a chain of dependent operations. One call for all wheels lets the processor overlap
+    the chains of neighbouring wheels.
     """
     held = mode & PATCHES_HELD
     if not held:
@@ -107,7 +109,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     for i in range(motions.shape[0]):
         for wheel in range(2):
             row, wrench, bend_y, bend_z = motions[i, wheel], wrenches[i, wheel], 0.0, 0.0
-            if not held:  # else the patches have it already
+            if not held:  # patches of the last evaluation already include the rail's curvature
                 bend_y, bend_z = row[MOTION.bend_y], row[MOTION.bend_z]
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):

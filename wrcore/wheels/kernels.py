@@ -1,5 +1,6 @@
-"""Addresses of the kernels of patches on strips; those that solve one are compiled with a run, or, where patches are
-looked up, when the first one is to be solved."""
+"""Addresses of the kernels of patches on strips.
+
+Kernels that solve a patch are compiled at the start of a run; with a lookup table, when the first patch is solved."""
 
 import ctypes
 
@@ -25,7 +26,7 @@ from wrcore.wheels.table_force_apart import look_lobes_up
 
 
 def with_fallback(contact):
-    """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
+    """Return the contact model with the address of the grid solver, which is used if strips do not converge."""
     m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
     fallback = Kernel(
         solve_on_grid, Kind(without_wheels(contact)), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
@@ -35,7 +36,7 @@ def with_fallback(contact):
 
 
 def with_groups(contact, work):
-    """Contact on strips with the address of the kernel of its patches."""
+    """Return the contact model with the address of the kernel that computes the forces of a patch on strips."""
     looked_up = contact.strips.looked_up > 0.0
     contact = contact if looked_up else with_fallback(contact)
     group = _of_patches(add_tabulated if looked_up else add_group, contact, work)
@@ -43,7 +44,7 @@ def with_groups(contact, work):
 
 
 def with_late(contact):
-    """Contact on strips with tables, and with what is compiled late, its own and that of its wheels."""
+    """Return the contact model with its lookup tables and `LateKernels`, also in its wheel-specific models."""
     if len(contact.wheels):
         contact = contact._replace(wheels=np.asarray(Handles(map(_with_own, values_of(contact.wheels)))))
     return _with_own(contact)
@@ -57,14 +58,14 @@ def _with_own(contact):
 
 
 def _of_patches(kernel, contact, work):
-    """Address of a kernel of patches."""
+    """Return the address of ``kernel``, compiled for the signature of a kernel of patches (`add_group`)."""
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
     kind, counters = Kind(without_wheels(contact)), np.zeros(COUNTERS, np.int64)
     return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
 
 
 class LateKernels:
-    """What is compiled, and loaded, when kernels first ask for it: see `StripModel.late`."""
+    """Kernels that are compiled or loaded when a run first calls them, see `StripModel.late`."""
 
     def __init__(self, contact):
         self._contact, self._call = contact, ctypes.CFUNCTYPE(None, ctypes.c_int64)(self.find)
@@ -73,11 +74,13 @@ class LateKernels:
 
     @property
     def __array_interface__(self):
-        """`StripModel.late`: who holds it holds this."""
+        """Array interface of the addresses `StripModel.late`; an array made from it keeps this object alive."""
         return self._places.__array_interface__
 
     def find(self, which):
-        """Find the kernel with ellipses, that of lobes that are apart, or the solver and its model."""
+        """Compile and store a kernel: that of ellipses, that of separate sub-patches, or the solver with its model.
+
+        ``which`` is an index of `StripModel.late`."""
         if interrupted():
             return
         what = {ELLIPSES: "ellipses", LOBES: "lobes that are apart"}.get(which, "the solver of exact contact")

@@ -1,30 +1,30 @@
-"""What a right-hand side may leave out or start from: bits of its argument ``mode``."""
+"""Modes of an evaluation of the right-hand side: bits of its argument ``mode``, which may be combined."""
 
 FRESH = 0
-"""All of it, from nothing: the same numbers whatever was evaluated before."""
+"""Full evaluation without starting values: the result does not depend on earlier evaluations."""
 
 WARM = 1
-"""Within a step: patches on strips start from their last solutions, part of what a run knows."""
+"""Evaluation within a step: patches on strips start from their last solutions, which are part of a run's state."""
 
 ELLIPSES = 2
-"""The ellipse of equal moments stands in for strips that are solved: differences want a smooth neighbour of
-the model."""
+"""Replace solved strips by the ellipse of equal moments: difference quotients need a smooth approximation of the model.
+"""
 
 PATCHES_HELD = 4
-"""Patches are those found last: only velocities have changed. Where they are looked up, they are looked up again."""
+"""Keep the patches of the last evaluation, as only velocities have changed. Table patches are interpolated again."""
 
 WRENCHES_HELD = 8
-"""The rails' wrenches are those found last."""
+"""Keep the forces and moments of the rails of the last evaluation."""
 
 PATCHES_ONLY = 16
-"""Overlaps are found, those that are looked up as of left wheels, no wrenches."""
+"""Search only: fill the overlaps (those of table wheels mirrored to the left side) and compute no forces."""
 
 BARE = 32
-"""Wrenches and counts alone: of patches that are looked up no rows are filled, which nobody reads within a step."""
+"""Compute forces and counts only: rows of table patches are not filled, as they are not read within a step."""
 
 SPEEDS_GIVEN = 64
-"""Speeds of rails without mass are about those in the work; one step of Newton's method leads on, see
+"""Start from approximate speeds of massless rails in the workspace and do one Newton step, see
 :mod:`wrcore.jacobian.flexible_track`."""
 
 STAGE = WARM | BARE
-"""What integrators ask for."""
+"""Mode of the stages of integrators."""

@@ -1,4 +1,4 @@
-"""Motion of a wheel in its rail's frame: all that its contact depends on."""
+"""Motion of a wheel in its rail's frame: the input of all contact models."""
 
 from typing import NamedTuple
 
@@ -6,17 +6,17 @@ from wrcore.kernels.jit import jit
 
 
 class WheelMotion(NamedTuple):
-    """Motion of a wheel in its rail's frame, in which the rail runs along x: its wheelset's, and what it rolls on."""
+    """Motion of a wheelset in the frame of one wheel's rail (x along the rail), curvature and friction of this rail."""
 
     side: float
     """+1 left, -1 right."""
     y: float
     z: float
-    """Of the wheelset's centre, m."""
+    """Position of the wheelset's centre, m."""
     ex: float
     ey: float
     ez: float
-    """Direction of the axle, pointing left."""
+    """Unit vector of the axle, pointing left."""
     vx: float
     vy: float
     vz: float
@@ -27,18 +27,18 @@ class WheelMotion(NamedTuple):
     """Angular velocity, rad/s."""
     bend_y: float
     bend_z: float
-    """Curvature of the rail's line towards y and z, 1/m; 0 on a tangent track."""
+    """Curvature of the rail's line towards y and z, 1/m; 0 on tangent track."""
     friction: float
-    """Coefficient of friction of the rail under the wheel, at no slip."""
+    """Coefficient of friction of the rail under the wheel, at zero slip."""
 
 
 MOTION = WheelMotion(*range(15))
-"""Columns of an array of such motions."""
+"""Column of each field of `WheelMotion` in an array of motions."""
 
 
 @jit(allocates=False, forceinline=True)
 def motion_of(row):
-    """The motion in a row of such an array."""
+    """Return the `WheelMotion` of one row of an array of motions."""
     return WheelMotion(
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10], row[11], row[12],
         row[13], row[14],
@@ -47,7 +47,7 @@ def motion_of(row):
 
 @jit(allocates=False, forceinline=True)
 def as_left(m):
-    """Motion of a wheel as that of a left one, its mirror image if it is a right one."""
+    """Return the motion of a left wheel: ``m`` itself, or its mirror image if it is that of a right wheel."""
     if m.side > 0.0:
         return m
     return WheelMotion(

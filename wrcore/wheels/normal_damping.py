@@ -1,7 +1,7 @@
-"""How far the damping lifts a wheel, and which overlaps the lifted wheel has.
+"""Lift of a wheel by the contact damping, and overlaps of the lifted wheel.
 
-The damping factor acts as on an ellipse: the half-space sees the elastic approach c_d^(2/3) delta, and the wheel is
-lifted along the contact normal by the rest; how deep, along which normal and how fast:
+The damping factor acts as on an ellipse: the elastic approach of the half-spaces is c_d^(2/3) delta, and the wheel is
+lifted along the contact normal by the remainder of the penetration delta. Depth, normal and approach speed come from
 :mod:`wrcore.contact.search.approach`.
 """
 
@@ -16,7 +16,7 @@ from wrcore.kernels.jit import FUSED, jit
 
 
 class Lift(NamedTuple):
-    """What the damping lifts a wheel by: a share of the depth (m) along the normal."""
+    """Lift of a wheel by the damping: a share of the depth (m), along the normal with this cosine and sine."""
 
     share: float
     depth: float
@@ -26,21 +26,23 @@ class Lift(NamedTuple):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def lift_share(model, approach):
-    """Share of its depth by which the damping lifts a wheel."""
+    """Share of the depth by which the damping lifts a wheel at an ``approach`` speed (m/s)."""
     factor = damping_factor(approach, model.damping, model.damping_speed)
     return 1.0 - factor * inverse_cube_root(factor)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def lift_of(model, m, pressed):
-    """`Lift` of a wheel whose overlaps have ``pressed``."""
+    """Return the `Lift` of a wheel from the moments ``pressed`` of its overlaps and its motion ``m``."""
     depth, cosine, sine, approach = approach_of(pressed, m)
     return Lift(lift_share(model, approach), depth, cosine, sine)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _overlaps_above(model, m, height, lift, spatial, ends, rows):
-    """Pose of a wheel lifted by a ``height``, and which of its overlaps lie between two ends on its profile."""
+    """Return the `Pose` of a wheel lifted by ``height`` (m), and first and last of its overlaps between two ``ends``.
+
+    The ends are coordinates on the wheel's profile (m); the last index is exclusive. Fills ``rows``."""
     low, y, z = 0, m.y - height * lift.sine, m.z + height * lift.cosine
     pose = make_pose(1.0, y, z, m.ex, m.ey, m.ez, spatial)
     high = count = find_patches(model.geometry, 1.0, y, z, m.ex, m.ey, m.ez, spatial, reduction.MOMENT, rows)
@@ -53,9 +55,10 @@ def _overlaps_above(model, m, height, lift, spatial, ends, rows):
 
 @jit(allocates=False, fastmath=FUSED)
 def lifted(model, m, lean, pressed, lift, spatial, ends, work):
-    """Overlaps of a lifted wheel between two ``ends`` on its profile (m), into ``work.rows``: (pose, first, last).
+    """Fill ``work.rows`` with the overlaps of a lifted wheel between two ``ends`` on its profile (m).
 
-    M0^0.4 of what has ``pressed`` falls by the share of the lift: the first of two steps is right for a parabola."""
+    Returns (pose, first, last), with ``last`` exclusive. The height is found such that M0^0.4 of the overlap falls by
+    the share of the lift, where M0 is the moment ``pressed.square``. Of two steps the first is exact for a parabola."""
     rest, height = 1.0 - lift.share, lift.share * lift.depth
     pose, low, high = _overlaps_above(model, m, height, lift, spatial, ends, work.rows)
     if high > low:

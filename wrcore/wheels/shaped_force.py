@@ -1,13 +1,13 @@
-"""Wrench of the rails on wheelsets whose creep table knows the patch's shape: two half ellipses (SDEC) per patch.
+"""Force and moment of the rails on wheelsets from patches of two half ellipses (SDEC), with a creep table over shape.
 
-A patch's third input beside a and b is its shape number psi = (b_pos - b_neg)/(b_pos + b_neg). It comes from the
-skewness of g^2 over the overlap: an overlap made of two half parabolas of widths b(1 - psi) and b(1 + psi) has, over
-g^2 and about its mean, the second and third moments
+The creep table depends on a, b and the patch's shape number psi = (b_pos - b_neg)/(b_pos + b_neg). The shape number
+follows from the skewness of g^2 over the overlap, where g is the overlap's depth. An overlap of two half parabolas of
+widths b(1 - psi) and b(1 + psi) has, weighted by g^2 and about its mean, the second and third moments
 
     b^2 (1/7 + 17/448 psi^2),   b^3 psi (5/112 - 5/1792 psi^2).
 
-Normal force and semi-axes stay those of the ellipse of equal moments. Its load's centroid stays where it is: the middle
-of the two half ellipses, to which the table's creepages and moment refer, lies b psi/4 beyond it.
+Normal force, semi-axes and centroid of the load are those of the ellipse of equal moments. The table's creepages and
+moment refer to the middle of the two half ellipses, which lies b psi/4 beyond the centroid.
 
 References
 ----------
@@ -27,14 +27,16 @@ from wrcore.wheels.modes import FRESH
 from wrcore.wheels.motion import motion_of
 
 STEPS = 16
-"""Steps over the parabola's half width in which the overlap is looked at."""
+"""Number of integration steps over the half width of the parabolic overlap."""
 
 _FARTHEST = 3 * STEPS
 
 
 @jit(allocates=False, fastmath=FUSED)
 def overlap_skewness(geometry, pose, u, step):
-    """Third over second central moment^1.5 of g^2 (in u, outwards) over the overlap around ``u``, by steps (m)."""
+    """Skewness of g^2 over the overlap around ``u``: third central moment over second central moment^1.5.
+
+    Moments are over u (m), the coordinate on the wheel's profile, positive outwards; ``step`` (m): integration step."""
     m0 = m1 = m2 = m3 = 0.0
     for direction in (-1.0, 1.0):
         for i in range(_FARTHEST):
@@ -53,7 +55,7 @@ def overlap_skewness(geometry, pose, u, step):
 
 @jit(allocates=False, fastmath=FUSED)
 def shape_number(skewness):
-    """psi of two half parabolas with a skewness of g^2, at most `PSI_MAX`, by Newton's steps."""
+    """Shape number psi of two half parabolas with a given skewness of g^2, within ± `PSI_MAX`, by Newton's method."""
     psi = 0.0
     for _ in range(6):
         square = psi * psi
@@ -67,7 +69,9 @@ def shape_number(skewness):
 
 @jit(allocates=False, fastmath=FUSED)
 def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
-    """As `wrcore.wheels.hertzian_force.wheel_wrenches`, whose arguments it takes, with the patches' shape numbers."""
+    """Fill the forces and moments of the rails on all wheels from patches with shape numbers (two half ellipses).
+
+    Arguments are those of `wrcore.wheels.hertzian_force.wheel_wrenches`."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m, wrench, rows = motion_of(motions[i, wheel]), wrenches[i, wheel], patches[i, wheel]

@@ -1,17 +1,17 @@
-"""Wrench of the rails on a wheel by the surrogate of exact contact (:mod:`wrcore.contact.surrogate`).
+"""Force and moment of the rails on a wheel by the surrogate of exact contact (:mod:`wrcore.contact.surrogate`).
 
-Nothing is solved and nothing is kept between evaluations. From a wheel's position to its contact forces:
+No equation is solved and no result is kept between evaluations. Steps from a wheel's position to its contact forces:
 
-1. The search finds overlaps. Neighbours within 0.5 rad are one group, those of a group that lie near each other one
-   contact patch.
-2. The damping lifts the wheel (:mod:`wrcore.wheels.normal_damping`); so do the other patches of the same group of
-   overlaps.
-3. Strips across the patch give 38 descriptors, and these the network's outputs.
-4. `press_patch`: normal force, semi-axes, place and contact angle.
-5. `roll_patch`: creepages at that place, the creep table at that ellipse, and the remainder by the force modes.
+1. The search finds overlaps. Neighbours within 0.5 rad form one group; overlaps of a group that are close to each
+   other form one contact patch.
+2. The damping lifts the wheel (:mod:`wrcore.wheels.normal_damping`), and so do the other patches of the same group.
+3. 38 descriptors are computed from strips across the patch, and the network's outputs from the descriptors.
+4. `press_patch`: normal force, semi-axes, position and contact angle.
+5. `roll_patch`: creepages at this position, interpolated creep table for this ellipse, and the network's correction
+   of the creep force by force modes.
 
-Every output is bounded, whatever the descriptors are: ln N beside that of a parabolic overlap, the place within the
-patch, the creep force by friction, its power by zero.
+Every output is bounded: ln N relative to a parabolic overlap, the position within the patch, the creep force by
+friction, and its power by zero.
 """
 
 import math
@@ -41,42 +41,42 @@ from wrcore.wheels.table.lookup import APART, DISK, FAR, LOCKED, SADDLE, _at_ell
 _ONE_PATCH = APART, FAR, SADDLE
 
 _ROUNDS = 5
-"""Evaluations of patches that press each other: the first one alone, then with the rise by the loads found last. Each
-round reduces the change of the loads to a tenth."""
+"""Number of iterations over patches that interact elastically. The first ignores the interaction; each other one uses
+the loads of the one before. Each iteration reduces the change of the loads to a tenth."""
 
 _LEAST_FRICTION = 0.04
-"""Friction that the network's inputs have below it; forces are those at the true friction."""
+"""Lower bound of the coefficient of friction in the network's inputs; forces are those at the true coefficient."""
 
 _MOST_LOG_LOAD, _MOST_LOG_AXIS, _MOST_ANGLE = 0.6, 0.8, 0.15
-"""Bounds of what the network adds to ln N, ln a and ln b, and to the contact angle (rad). In training 99.9 % of the
-corrections are below half of them."""
+"""Bounds of the network's corrections of ln N, of ln a and ln b, and of the contact angle (rad). In training 99.9 % of
+the corrections are below half of these bounds."""
 
 _MOST_SHIFT, _MOST_WIDTH = 3.0, 3.0
-"""Bounds of the place across the patch over sigma, and half of that of the variance of its width over sigma^2; a
-parabolic overlap has 0 and 1.4."""
+"""Bound of the position across the patch over sigma, and half of the bound of the variance of its width over sigma^2.
+Both values are 0 and 1.4 for a parabolic overlap."""
 
 _MOST_MOMENT = 1.0
-"""Bound of what the network adds to the moment about the normal, over friction times N times c."""
+"""Bound of the network's correction of the moment about the normal, divided by friction times N times c."""
 
 
 class Pressed(NamedTuple):
-    """Normal contact of a patch, of a wheel that rolls forward."""
+    """Normal contact of one patch of a wheel that rolls forward."""
 
     load: float
-    """Normal force, N; 0 if it does not touch."""
+    """Normal force, N; 0 without contact."""
     log_a: float
     log_b: float
     """Logarithms of the semi-axes over 1 m."""
     p_max: float
-    """Largest pressure, Pa."""
+    """Maximum pressure, Pa."""
     px: float
     py: float
     pz: float
-    """Where it slips, from the wheelset's centre, m."""
+    """Reference point of the creepages, relative to the wheelset's centre, m."""
     angle: float
     """Contact angle, rad."""
     trust: float
-    """Share of the network's outputs that counts, 1 in the range of its training and near it."""
+    """Factor of the network's outputs: 1 within and near the range of its training."""
 
 
 NOTHING_PRESSED = approach.Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -85,25 +85,25 @@ _NO_CONTACT = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Rolled(NamedTuple):
-    """Creep of a patch."""
+    """Creepages, creep forces and spin moment of one patch."""
 
     xi: float
     eta: float
     phi: float
-    """Creepages and spin (1/m), without what friction on other patches adds."""
+    """Creepages and spin (1/m), without the elastic slip that friction on other patches causes."""
     fx: float
     fy: float
     mz: float
-    """Forces along and across (N), and moment about the normal (N m)."""
+    """Longitudinal and lateral creep force (N), and moment about the normal (N m)."""
     missed: int
-    """Look-ups outside the creep table."""
+    """Number of interpolations outside the range of the creep table."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def bounded(x, bound):
-    """x up to half of the bound, then a curve that joins smoothly and never reaches the bound."""
+    """Return x up to half of the bound, beyond it a smooth continuation that never reaches the bound; 0 for NaN."""
     half = 0.5 * bound
-    over = min(abs(x) - half, 1e6 * half)  # of infinity, too
+    over = min(abs(x) - half, 1e6 * half)  # finite for infinite x
     if not over > 0.0:
         return x if x == x else 0.0
     return math.copysign(half + over / math.sqrt(1.0 + (over / half) * (over / half)), x)
@@ -111,8 +111,9 @@ def bounded(x, bound):
 
 @jit(allocates=False, forceinline=True)
 def left_ahead(m):
-    """The motion of a left wheel that rolls forward, of which the wheel is a mirror image: a right one across the
-    track, one that rolls back along it."""
+    """Return the motion of the equivalent left wheel that rolls forward.
+
+    A right wheel is mirrored across the track, and a wheel that rolls backward along the track."""
     m = as_left(m)
     if m.vx >= 0.0:
         return m
@@ -123,29 +124,32 @@ def left_ahead(m):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _lifted_wheel(m, lift, rise, tilt, ellipse):
-    """Position of a wheel that the damping lifts, and that the other patches lift by ``rise`` and tilt about the place
-    of this patch: y and z of its centre (m), its axle's z component, and the part of y and z that is due to the tilt.
-    """
+    """Position of a wheel that is lifted by the damping, and lifted and tilted by the loads on its other patches.
+
+    The other patches lift it by ``rise`` (m) and tilt it about the position of this patch. Returns y and z of the
+    centre (m), the axle's z component, and the parts of y and z that are due to the tilt (m)."""
     height, ty, tz = lift.share * lift.depth + rise, tilt * ellipse[2], -tilt * ellipse[1]
     return m.y - height * lift.sine + ty, m.z + height * lift.cosine + tz, m.ez + tilt, ty, tz
 
 
 class LiftedPatch(NamedTuple):
-    """A patch of a wheel that damping and other patches lift: its form, what leads from a rail coordinate to the place
-    across the track from the wheelset's centre (m), and what the tilt by other patches adds to the place across and up
-    (m)."""
+    """One patch of a wheel that is lifted by the damping and by its other patches."""
 
     shape: PatchShape
     aside: float
+    """Distance to add to a rail coordinate for the lateral position relative to the wheelset's centre, m."""
     ty: float
     tz: float
+    """Lateral and vertical shift of the position by the tilt due to other patches, m."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work):
-    """Fill ``work.strips`` of the patch ``q`` of ``work.forces`` where the wheelset's centre stands at ``y`` and ``z``
-    and its axle has the component ``ez``; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap. Returns the pose, the
-    number of strips and their spacing (m)."""
+    """Fill ``work.strips`` with the strips of the patch ``q`` of ``work.forces``.
+
+    The wheelset's centre is at ``y`` and ``z`` (m), and the vertical component of its axle is ``ez``. The patch's
+    overlap of maximum penetration is written to ``row`` (PATCH_COLUMNS,). Returns the wheel's `Pose`, the number of
+    strips and their spacing (m)."""
     first, last = work.forces.first[q], work.forces.last[q]
     copy_deepest(rows, first, last, row)
     pose = make_pose(1.0, y, z, m.ex, m.ey, ez, is_spatial)
@@ -156,9 +160,10 @@ def _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def press_group(geometry, m, is_spatial, lean, rows, count, row, work):
-    """`wrcore.contact.search.approach.Pressed` of the ``count`` patches of a group, and the number of strips of the
-    last one,
-    which ``work.strips`` then holds; ``row`` (PATCH_COLUMNS,) becomes its deepest overlap."""
+    """Return the sum of the overlap moments (`wrcore.contact.search.approach.Pressed`) of a group's ``count`` patches.
+
+    Also returns the number of strips of the last patch, which stay in ``work.strips``. Its overlap of maximum
+    penetration is written to ``row`` (PATCH_COLUMNS,)."""
     total, n = NOTHING_PRESSED, 0
     for q in range(count):
         pose, n, step = _fill_patch(geometry, m, is_spatial, m.y, m.z, m.ez, rows, q, row, work)
@@ -169,9 +174,9 @@ def press_group(geometry, m, is_spatial, lean, rows, count, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work):
-    """`LiftedPatch` of the patch ``q`` of ``work.forces``. ``filled``: number of strips that `press_group` has left of
-    an only patch, else 0. ``row`` (PATCH_COLUMNS,) becomes its deepest overlap, and ``work.network.descriptors`` those
-    of the patch."""
+    """Return the `LiftedPatch` of the patch ``q`` of ``work.forces`` and fill ``work.network.descriptors``. ``filled``
+    is the number of strips of a single patch that `press_group` has filled, else 0. The patch's overlap of maximum
+    penetration is written to ``row`` (PATCH_COLUMNS,)."""
     geometry, forces, n = model.geometry, work.forces, filled
     y, z, ez, ty, tz = _lifted_wheel(m, lift, forces.rise[q], forces.tilt[q], forces.ellipses[q])
     if filled > 0:
@@ -186,8 +191,9 @@ def describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def press_patch(model, m, is_spatial, lean, lift, rows, q, filled, row, work):
-    """`Pressed` of the patch ``q`` of ``work.forces``, in axes that ``lean`` as the rail does under the wheel;
-    ``filled`` and ``row`` as for `describe_patch`. ``work.network.outputs`` become those of the patch."""
+    """Return the normal contact (`Pressed`) of the patch ``q`` of ``work.forces``, in axes inclined along the track by
+    ``lean``, as the rail under the wheel. ``filled`` and ``row`` are those of `describe_patch`. The network's outputs
+    for the patch are written to ``work.network.outputs``."""
     if not lift.share < 1.0:
         return _NO_CONTACT
     patch = describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work)
@@ -199,7 +205,7 @@ def press_patch(model, m, is_spatial, lean, lift, rows, q, filled, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def pressed_of(model, patch, lean, tilt, trust, outputs):
-    """`Pressed` of a `LiftedPatch` for these ``outputs`` of the network, in axes that ``lean``."""
+    """Return the normal contact (`Pressed`) of a `LiftedPatch` for network ``outputs``, in axes inclined by ``lean``."""
     p = _pressed(model, patch.shape, trust, model.surrogate.corrections, outputs)
     px, pz = leaning(model.geometry, lean, p.px, p.pz + patch.tz)
     return Pressed(p.load, p.log_a, p.log_b, p.p_max, px, p.py + patch.aside, pz, p.angle - 0.5 * tilt, p.trust)
@@ -207,11 +213,11 @@ def pressed_of(model, patch, lean, tilt, trust, outputs):
 
 @jit(allocates=False, fastmath=FUSED)
 def _pressed(model, shape, trust, scales, outputs):
-    """`Pressed` of a patch of this shape; ``py`` is its rail coordinate, ``px`` and ``pz`` are from the wheelset's
-    centre. ``scales`` multiply the network's first ``outputs``."""
+    """Return the normal contact (`Pressed`) of a patch of this shape. ``py`` is the rail coordinate (m); ``px`` and
+    ``pz`` are relative to the wheelset's centre (m). The network's first ``outputs`` are multiplied by ``scales``."""
     modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
     half_width, size = math.sqrt(7.0) * shape.sigma, shape.length
-    depth = math.sqrt(0.9375 * shape.square / half_width)  # of the parabolic overlap with this M0 and sigma
+    depth = math.sqrt(0.9375 * shape.square / half_width)  # parabolic overlap with this M0 and sigma
     stiffness, a, b, _ = hertz_shape_at(model.hertz, shape.curvature, depth / (half_width * half_width))
     root = math.sqrt(depth)
     load, a, b = modulus * stiffness * depth * root, a * root, b * root
@@ -234,9 +240,10 @@ def _pressed(model, shape, trust, scales, outputs):
 
 @jit(allocates=False, fastmath=FUSED)
 def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
-    """`Rolled` of a patch of a wheel that rolls forward; ``outputs`` are the network's.
+    """Return creepages and creep forces (`Rolled`) of one patch of a wheel that rolls forward.
 
-    Below the least speed spin fades out with the speed, so that nothing jumps where a wheel stops and rolls back."""
+    ``slip_xi`` and ``slip_eta`` are creepages due to friction on other patches; ``outputs`` are those of the network.
+    Below the least speed, spin decreases in proportion to speed: forces are continuous where a wheel reverses."""
     radius, cosine, sine = model.geometry.rolling_radius, math.cos(pressed.angle), math.sin(pressed.angle)
     speed = max(m.vx, model.least_speed)
     xi, eta, phi, _ = creepages(
@@ -262,9 +269,9 @@ def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def without_power(f1, f2, m3, x, y, spin):
-    """Creep force and moment that produce no power in the creepages ``x``, ``y`` and ``spin``.
+    """Reduce creep force and moment such that their power in the creepages ``x``, ``y`` and ``spin`` is not positive.
 
-    Where they would, the moment is reduced first, then the force along the creepages."""
+    If the power is positive, the moment is reduced first, then the force component along the creepages."""
     of_force, of_moment = f1 * x + f2 * y, m3 * spin
     if of_force + of_moment > 0.0:
         if of_moment > 0.0:
@@ -278,7 +285,7 @@ def without_power(f1, f2, m3, x, y, spin):
 
 @jit(allocates=False, fastmath=FUSED)
 def _couple(model, count, forces):
-    """Find rise, tilt and slip of each patch by the loads and the friction on the others."""
+    """Fill rise, tilt and creepages of each patch due to the loads and the friction on the other patches."""
     per_load = 1.0 / (math.pi * contact_modulus(model.shear_modulus, model.poisson_ratio))
     per_friction = 1.0 / (math.pi * model.shear_modulus)
     for q in range(count):
@@ -297,8 +304,8 @@ def _couple(model, count, forces):
 
 @jit(allocates=False, fastmath=FUSED)
 def find_patches(geometry, m, is_spatial, rows, first, last, forces):
-    """Number of patches that the overlaps from ``first`` to before ``last`` form; writes where each begins and ends,
-    and that nothing presses on them."""
+    """Number of patches that the overlaps from ``first`` to before ``last`` form. Writes first and last overlap of each
+    patch to ``forces``, and sets its load, rise, tilt and slip to zero."""
     pose, count = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, is_spatial), 0
     while first < last:
         end = lobe_end(geometry, pose, rows, first, last, _ONE_PATCH)
@@ -311,7 +318,7 @@ def find_patches(geometry, m, is_spatial, rows, first, last, forces):
 
 @jit(allocates=False, fastmath=FUSED)
 def _fill_row(m, p, r, place, row):
-    """Write a patch into its row of patches; ``place`` (m): x, y, z from the wheelset's centre."""
+    """Write a patch to its ``row`` of patches; ``place``: x, y, z relative to the wheelset's centre, m."""
     row[reduction.X], row[reduction.Y], row[reduction.Z] = place[0], place[1] + m.y, place[2] + m.z
     row[reduction.ANGLE], row[reduction.COSINE] = p.angle, math.cos(p.angle)
     row[reduction.SINE], row[reduction.NORMAL] = math.sin(p.angle), p.load
@@ -323,8 +330,8 @@ def _fill_row(m, p, r, place, row):
 
 @jit(allocates=False, fastmath=FUSED)
 def add_patch(geometry, m, lean, p, r, wrench, row):
-    """Add a patch's force and moment about the wheelset's centre to ``wrench``, and write its ``row``. Place and forces
-    are in axes that ``lean`` as the rail does under the patch."""
+    """Add a patch's force and moment about the wheelset's centre to ``wrench``, and write its ``row``. Position and
+    forces of ``p`` and ``r`` are in axes inclined along the track by ``lean``, as the rail under the patch."""
     cosine, sine = math.cos(p.angle), math.sin(p.angle)
     fy, fz = r.fy * cosine - p.load * sine, r.fy * sine + p.load * cosine
     px, pz = upright(geometry, lean, p.px, p.pz)
@@ -339,16 +346,18 @@ def add_patch(geometry, m, lean, p, r, wrench, row):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def lean_of_group(geometry, m, rows, first, last, deepest):
-    """How a rail that changes along the track leans under a group of overlaps; ``deepest`` becomes its deepest row."""
+    """Inclination along the track (cosine, sine) of a changing rail under a group of overlaps; the row of maximum
+    penetration is copied to ``deepest``."""
     copy_deepest(rows, first, last, deepest)
     return lean_at(geometry, deepest[reduction.U_RAIL], deepest[reduction.Z] - m.z)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters, scratch_rows, work):
-    """Add the wrench of one group of overlaps of a left wheel that rolls forward, and write its patches' rows from
-    ``kept`` on; returns the number of rows then. Rows of overlaps are read before they are overwritten.
-    ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) is scratch."""
+    """Add force and moment of one group of overlaps of a left wheel that rolls forward to ``wrench``.
+
+    Writes the rows of its patches from row ``kept`` on and returns the number of rows written so far. Rows of overlaps
+    are read before they are overwritten. ``scratch_rows`` (MAX_PATCHES, PATCH_COLUMNS) is scratch."""
     geometry, forces = model.geometry, work.forces
     lean = lean_of_group(geometry, m, rows, first, last, scratch_rows[0])
     moving = leaning_motion(geometry, m, lean)
@@ -385,7 +394,7 @@ def group_forces(model, m, is_spatial, rows, first, last, kept, wrench, counters
 
 @jit(allocates=False)
 def mirror_back(rows, count, wrench):
-    """Patches and wrench of a wheel that rolls forward as those of its mirror image along x, which rolls back."""
+    """Mirror patches and wrench along x in place, from a wheel that rolls forward to one that rolls backward."""
     wrench[0], wrench[4], wrench[5] = -wrench[0], -wrench[4], -wrench[5]
     for i in range(count):
         for column in (reduction.S_WHEEL, reduction.X, reduction.FX, reduction.MZ, reduction.XI, reduction.PHI):
@@ -394,7 +403,9 @@ def mirror_back(rows, count, wrench):
 
 @jit(allocates=False, fastmath=FUSED)
 def surrogate_wrenches(model, motions, patches, counts, bounds, wrenches, counters, scratch, mode=FRESH):
-    """Force and moment of the rails on all wheels; arguments as for `wrcore.wheels.hertzian_force.wheel_wrenches`."""
+    """Fill the forces and moments of the rails on all wheels by the surrogate of exact contact.
+
+    Arguments are those of `wrcore.wheels.hertzian_force.wheel_wrenches`."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
