@@ -1,1 +1,1 @@
-"""The equations of motion: model, right-hand side, energy, outputs. The interface that integrators see."""
+"""Equations of motion: model, right-hand side, energy, outputs, and the interface for integrators."""

@@ -1,21 +1,20 @@
-"""Energies and powers of a model: what a run stores, what it loses and what drives it.
+"""Energies and powers of a model: stored energy, losses and inputs of a run.
 
-Sorted by what they do to the energy E = kinetic + gravitational + springs + elastic contact, the forces of the
-equations of motion have the powers
+The energy is E = kinetic + gravitational + springs + elastic contact. The forces of the equations of motion change it
+by the powers
 
     E' = P_frame + P_joints + P_motors - P_brakes - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
 
-Rigid rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
-Of a flexible track (:mod:`wrcore.track.flexible_track`) masses, springs and dampers count with those of the vehicle,
-and the power of the contacts is that on both sides: between a wheel and a rail that moves.
+Rigid rails are at rest: with any irregularity, energy enters only by the pull of the moving frame. Masses, springs and
+dampers of a flexible track (:mod:`wrcore.track.flexible_track`) are included in those of the vehicle. The power of a
+contact is then the sum of both sides, wheel and moving rail.
 
-*Elastic contact.* Eq. (7) is a spring N_el = c_d(0) K delta^1.5 and a damping N - N_el. The spring's power P_elastic =
-N_el (approach speed) is the rate of U_contact = 2/5 N_el delta where K is constant and the approach speed the rate of
-delta. Along a profile neither holds exactly, and N_el is not quite the gradient of U_contact: the last term is what
-that leaves.
+*Elastic contact.* Eq. (7) is a spring N_el = c_d(0) K delta^1.5 and a damping N - N_el. The spring's power is P_elastic
+= N_el (approach speed). It equals the rate of U_contact = 2/5 N_el delta if K is constant and the approach speed is the
+rate of delta. Along a profile both hold only approximately; the last term is the resulting difference.
 
-*Contact powers* follow from the equations of motion with all else switched off. Without friction, the power of the
-normal forces is left; without contact damping, too, that of Hertz's.
+*Contact powers* are computed from the equations of motion with all other forces switched off. Without friction, the
+power of the normal forces remains; without contact damping as well, that of Hertzian normal forces remains.
 """
 
 from typing import NamedTuple
@@ -40,21 +39,22 @@ CHANNELS = (
     "input_by_frame_W", "input_by_joints_W", "dissipated_by_dampers_W", "dissipated_by_creep_W",
     "dissipated_by_contact_damping_W", "stored_by_springs_W", "stored_by_gravity_W", "stored_by_elastic_contact_W",
 )  # fmt: skip
-"""Names of the channels: stores, inputs, losses, and the powers that go into the stores."""
+"""Names of the channels: stored energies (J), then powers (W) of inputs, losses and stores."""
 
 DRIVE_CHANNELS = ("input_by_motors_W", "dissipated_by_brakes_W")
-"""Further ones where a scene has motors or brakes."""
+"""Names of further channels of scenes with motors or brakes."""
 
 
 class EnergyBalance(NamedTuple):
-    """Where a run's energy went, as functions of time; all arrays have shape (n,)."""
+    """Energy balance of a run over time; all arrays have shape (n,)."""
 
     turned_over: np.ndarray
-    """Energy that has passed from one store, source or sink to another, half the integral of the sum of |powers|, J."""
+    """Energy exchanged between stores, sources and sinks: half the integral of the sum of |powers|, J."""
     imbalance: np.ndarray
-    """Energy that is missing: change of the stores and losses less inputs, the contact's store by its power, J."""
+    """Error of the balance: change of the stores plus losses minus inputs, J. The contact's store is integrated from
+    its power."""
     contact_remainder: np.ndarray
-    """Change of 2/5 N_el delta less the integral of the elastic contact forces' power, J."""
+    """Change of 2/5 N_el delta minus the integral of the power of the elastic contact forces, J."""
 
 
 @jit(inline="always")
@@ -69,7 +69,7 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
         derivatives_at(equations, times[i], states[i], model, work, rate)
         powers[i] = work.flexible_track.power[0]
         for b in range(work.wrenches.shape[0]):
-            if carrying(model.bodies, b):  # what these moments do, kinetic energy has by the turn of the inertia's axes
+            if carrying(model.bodies, b):  # kinetic energy already contains their work, as the inertia's axes turn
                 axes, at = inertia_axes(model.bodies, work)[b], STATE_SIZE * b
                 add_carried_gyroscopic(model.bodies.inertia[b], axes, states[i], at, 1.0, work.wrenches[b])
             for k in range(6):
@@ -80,7 +80,9 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
 
 
 def _powers(times, states, model, work):
-    """Power of all wrenches of a model at each state, W, shape (n,), on rails too; gyroscopic moments have none."""
+    """Power of all forces and moments of a model, also those on rails, at each state, W, shape (n,).
+
+    Gyroscopic moments have no power."""
     powers = np.empty(len(times))
     _fill_powers(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), powers)
     return powers
@@ -88,7 +90,9 @@ def _powers(times, states, model, work):
 
 @jit
 def _kinetic_and_gravitational(model, axes, state):
-    """Kinetic and gravitational energy of all bodies, J, and the rate of the latter, W; ``axes``: principal ones."""
+    """Kinetic and gravitational energy of all bodies, J, and the rate of the gravitational energy, W.
+
+    ``axes`` (n, 3, 3) are the principal axes of the bodies."""
     kinetic = height = rise = 0.0
     for b in range(model.bodies.mass.shape[0]):
         at, mass = STATE_SIZE * b, model.bodies.mass[b]
@@ -109,7 +113,7 @@ def _elastic_contact_energy(contact, work):
             for i in range(work.counts[k, wheel]):
                 row = work.patches[k, wheel, i]
                 delta = row[reduction.PENETRATION]
-                if not is_elliptic(contact):  # no potential is known: that of an ellipse under the same force
+                if not is_elliptic(contact):  # potential unknown: approximated by that of an ellipse with this force
                     force = row[reduction.NORMAL]
                 else:
                     along, across = row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y]
@@ -120,7 +124,8 @@ def _elastic_contact_energy(contact, work):
 
 @jit
 def _energies(times, states, evaluation, work):
-    """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8).
+    """Four stored energies (J), rates of springs and gravity, damper losses and power of the frame (W), shape (n, 8).
+
     ``evaluation``: the arguments of the model's `Equations` with this workspace."""
     rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
     equations, model, work_handle = evaluation
@@ -138,9 +143,11 @@ def _energies(times, states, evaluation, work):
 
 
 def energy_channels(model, work, times, states):
-    """Energies (J; gravitational from z = 0, springs from nominal position) and powers (W) along a run, channels (n,)
-    by name with their unit, from ``times`` (s) and ``states`` (n, size). ``work`` is overwritten, but for its counters
-    of creep look-ups; its arc lengths are those near which the first ones are sought."""
+    """Compute energies (J) and powers (W) of a run: channels (n,) by name, which includes the unit.
+
+    Gravitational energy is relative to z = 0, that of springs to their nominal position. ``times`` (s) has shape (n,),
+    ``states`` (n, size). ``work`` is overwritten except for its counter of creep interpolations out of range; the
+    search for arc lengths starts from those in it."""
     times, states = np.asarray(times, float), np.ascontiguousarray(states, float)
     begin, outside = work.arc_lengths.copy(), int(work.counters[OUT_OF_RANGE])
     if flexible := len(model.flexible_track.mass) > 0:
@@ -170,16 +177,19 @@ def energy_channels(model, work, times, states):
 
 
 def _anew(model, arc_lengths):
-    """A workspace that knows arc lengths (k,), m, and no other evaluation: how many states there are changes no bit."""
+    """Return a new workspace with these arc lengths (k,), m.
+
+    It has no data of other evaluations, so results are bitwise identical for any number of states."""
     work = workspace(model)
     work.arc_lengths[:] = arc_lengths
     return work
 
 
 def _track_energies(model, states, work):
-    """Kinetic energy, energy of the springs, its rate and the loss of a flexible track, shape (4, n). Before them the
-    model and the states, in which rails without mass have velocities, too: as found by this model, for variants of
-    it."""
+    """Return model, states, and kinetic energy, spring energy, its rate and loss of a flexible track, shape (4, n).
+
+    In the returned model and states massless rails have velocities as states: those of this model, which variants of
+    it then use."""
     track, places, d = model.flexible_track, track_places(model), len(model.flexible_track.mass)
     if track.mass[0] == 0.0:
         rates = Equations(model, work).at(0.0, states)
@@ -196,15 +206,16 @@ def _track_energies(model, states, work):
 
 
 def _drive_powers(model, work, times, states):
-    """Channels `DRIVE_CHANNELS`."""
+    """Powers of motors and losses of brakes (W, shape (n,)) by the names `DRIVE_CHANNELS`."""
     torques, rates, *_ = drive_history(Equations(model, work), times, states)
     powers, brakes = torques * rates, model.drive.rows[:, KIND] == BRAKE
     return dict(zip(DRIVE_CHANNELS, (powers[:, ~brakes].sum(axis=1), -powers[:, brakes].sum(axis=1)), strict=True))
 
 
 def energy_balance(channels, times):
-    """EnergyBalance over a run from its `energy_channels`, by Simpson's rule over uniform output times (s), which must
-    be close enough for the powers' fastest changes."""
+    """Compute the `EnergyBalance` of a run from its `energy_channels` by Simpson's rule.
+
+    Output times (s) are uniform and must resolve the fastest changes of the powers."""
     from scipy.integrate import cumulative_simpson  # its import takes longer than most runs
 
     def gone(name):

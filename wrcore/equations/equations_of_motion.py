@@ -4,8 +4,8 @@
     [ D   0  ] [ lambda ] = [ gamma - 2 alpha Phi' - beta^2 Phi ]
 
 with v = (r', w) per body in track axes. M is block diagonal (mass, inertia in track axes), so the multipliers follow
-from the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, and the full matrix of Eq. (8) is never formed. A scene
-without joints does not run any of this.
+from the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, where gamma* is the second right-hand side. The full
+matrix of Eq. (8) is never formed. Multipliers are computed only for scenes with joints.
 """
 
 import numpy as np
@@ -36,8 +36,10 @@ from wrcore.wheels.motion import MOTION
 
 @jit(allocates=False, fastmath=FUSED)
 def _turn_independent_wheels(bodies, work, rate):
-    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia. The
-    wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset."""
+    """Fill the rates of half the difference of the rolling rates of independently rotating wheels.
+
+    Each wheel has half the wheelset's pitch moment of inertia. The rolling rate of the wheelset is the mean of both
+    wheels; its equation is that of a solid wheelset."""
     for j in range(bodies.independent.shape[0]):
         k = bodies.independent[j, 0]
         body = bodies.wheelsets[k]
@@ -50,7 +52,9 @@ def _turn_independent_wheels(bodies, work, rate):
 
 @jit(allocates=False, fastmath=FUSED)
 def wheel_motions(model, state, work):
-    """Fill the motions of all wheels in their rails' frames; the wheelsets' rotations are in ``work``."""
+    """Fill ``work.motions`` with the motions of all wheels in their rails' frames.
+
+    The wheelsets' rotation matrices must be in ``work.rotations``."""
     wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
     for k in range(wheelsets.shape[0]):
         at, axle = STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]]
@@ -84,7 +88,7 @@ def wheel_motions(model, state, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_rail_wrenches(model, state, work, rate, mode):
-    """Add the wrenches of the rails to those of the wheelsets; while they are held, those found last."""
+    """Add the forces and moments of the rails to those of the wheelsets; in mode `WRENCHES_HELD`, those found last."""
     wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, mode & WRENCHES_HELD
     if not held:
         wheel_motions(model, state, work)
@@ -104,13 +108,12 @@ def _add_rail_wrenches(model, state, work, rate, mode):
 
 @jit(allocates=False, fastmath=FUSED)
 def fill_derivatives(t, state, model, work, rate, mode=FRESH):
-    """Right-hand side of the equations of motion: fills ``rate``; patches and counts in ``work`` belong to this
-    evaluation afterwards. The ``mode`` is one of `wrcore.wheels.modes`.
+    """Compute the right-hand side of the equations of motion: fill ``rate``, and patches and their counts in ``work``.
 
-    The state: per body position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the
-    internal states of force elements (m), of wheels that turn independently (rad/s) and of a flexible track (m, m/s,
-    :mod:`wrcore.track.flexible_track`), the speed controller's integral (m), and what control laws hold
-    (:mod:`wrcore.forces.control`).
+    The ``mode`` is one of `wrcore.wheels.modes`. The state contains for each body position (m), Euler parameters,
+    velocity (m/s) and angular velocity (rad/s) in track axes. Internal states follow: those of force elements (m), of
+    independently rotating wheels (rad/s) and of a flexible track (m, m/s, :mod:`wrcore.track.flexible_track`), the
+    speed controller's integral (m), and states and held outputs of control laws (:mod:`wrcore.forces.control`).
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
@@ -153,20 +156,21 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
 
 @jit(allocates=False, forceinline=True)
 def derivatives_at(equations, t, state, model, work, rate, mode=FRESH):
-    """Right-hand side by its address; all else as for :func:`fill_derivatives`."""
+    """Compute the right-hand side by the address ``equations``; other arguments are those of `fill_derivatives`."""
     call_at(equations, t, state, model, work, rate, mode)
 
 
 @jit(allocates=False, nogil=True)
 def fill_many(equations, t, states, model, work, rates, mode=FRESH):
-    """Right-hand sides of several states (n, size), row by row."""
+    """Fill ``rates`` (n, size) with the right-hand sides at several ``states`` (n, size), row by row."""
     for i in range(states.shape[0]):
         derivatives_at(equations, t, states[i], model, work, rates[i], mode)
 
 
 class Equations:
-    """A model's equations of motion with their scratch arrays, as ``function(t, state)`` and, for kernels, as
-    ``arguments``: the right-hand side, and handles of model and work."""
+    """Equations of motion of a model with their scratch arrays, to be called as ``function(t, state)``.
+
+    For kernels, ``arguments`` contains the address of the right-hand side and handles of model and workspace."""
 
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work
@@ -175,23 +179,23 @@ class Equations:
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state, FRESH), model, work
 
     def planned(self, plan):
-        """What a function of the model plans, found once: good for all models of this structure."""
+        """Return ``plan(model)``, computed once: the result is valid for all models of this structure."""
         if plan not in self._planned:
             self._planned[plan] = plan(self.arguments[1].value)
         return self._planned[plan]
 
     def turn_to(self, model):
-        """Be the equations of another model of the same structure, with all its kernels."""
-        if len(model.drive.rows) or len(model.controls.rows):  # what they act on may be another body
+        """Replace the model by another of the same structure, which must have the addresses of its kernels."""
+        if len(model.drive.rows) or len(model.controls.rows):  # these may act on different bodies
             self._planned.clear()
         self.arguments[1].renew(model)
 
     def __call__(self, t, state, mode=FRESH):
-        """Rate of a state, shape (size,), at a time (s), in a mode of `wrcore.wheels.modes`."""
+        """Return the rate of a state, shape (size,), at a time (s), in a mode of `wrcore.wheels.modes`."""
         return self.at(t, state[None, :], mode)[0]
 
     def at(self, t, states, mode=FRESH):
-        """Rates of several states, shape (n, size), at one time (s)."""
+        """Return the rates of several states, shape (n, size), at one time (s); NaN if a user's law fails."""
         states, rates = np.ascontiguousarray(states, float), np.empty(states.shape)
         equations, model, work = self.arguments
         if fault := fault_in(fill_many, equations, t, states, model, work, rates, mode):

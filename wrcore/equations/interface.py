@@ -1,15 +1,15 @@
-"""What an integrator asks of a model besides its rates (`wrcore.equations.equations_of_motion.derivatives_at`).
+"""Interface of a model for integrators, besides its rates (`wrcore.equations.equations_of_motion.derivatives_at`).
 
 ===================================  ===================================================================================
-`begin`, `places`                    what a run knows beside its state: where the next searches start
-`kept_size`                          numbers that are kept of it before a step is tried
-`before_attempt`, `after_rejection`  keep them; undo what stages of a step that was none have made of it
-`outside`, `why_outside`             whether, and why, a state ends the run
-`touching`                           contacts of the last evaluation: more of them after a step are an impact in it
-`turn_rate`                          of axes in which a steady motion rests
+`begin`, `places`                    starting values of searches and solvers, which a run has besides its state
+`kept_size`                          number of these values that are saved before an attempted step
+`before_attempt`, `after_rejection`  save these values; restore them after a rejected step
+`outside`, `why_outside`             whether and why a state ends the run
+`touching`                           number of contacts in the last evaluation: an increase in a step means impact
+`turn_rate`                          turning rate of axes in which a steady motion is at rest
 ===================================  ===================================================================================
 
-Which unknowns act on which is in :mod:`wrcore.jacobian.links`, the part of the Jacobian that changes fastest in
+The coupling of unknowns is in :mod:`wrcore.jacobian.links`, the part of the Jacobian that changes fastest in
 :mod:`wrcore.jacobian.wheels`.
 """
 
@@ -22,29 +22,31 @@ from wrcore.kernels.jit import jit
 from wrcore.track.track import track_poses
 
 WILD = 10.0
-"""A stage whose wheelset is so far along the track from where it was, m, is none of a step that is accepted."""
+"""Distance along the track, m; a step with a stage in which a wheelset moves farther than this is never accepted."""
 
 
 def places(work):
-    """Where the next searches start: arc lengths of the wheelsets (m) and last solutions of patches on strips."""
+    """Return the starting values of searches and solvers: the wheelsets' arc lengths (m), last solutions of patches."""
     return work.arc_lengths, work.strips.memory
 
 
 def begin(work):
-    """Forget the patches of earlier runs."""
+    """Delete the solutions of patches of earlier runs from the workspace."""
     work.strips.memory[...] = 0.0
 
 
 def kept_size(model, work):
-    """Numbers of `before_attempt`: solutions are kept where all patches are solved, a millisecond each; what is looked
-    up is quicker than to copy them."""
+    """Number of values that `before_attempt` saves.
+
+    Solutions of patches are included only if all patches are solved (a millisecond each). Interpolation in a lookup
+    table is faster than copying them."""
     solved = model.contact.strips.strips and not model.contact.strips.looked_up
     return work.arc_lengths.size + (work.strips.memory.size if solved else 0)
 
 
 @jit(allocates=False)
 def before_attempt(work, kept):
-    """Keep in ``kept`` (`kept_size`,) where searches start."""
+    """Save the starting values of searches and solvers in ``kept`` (`kept_size`,)."""
     arcs = work.arc_lengths.shape[0]
     copy_into(kept[:arcs], work.arc_lengths)
     if kept.shape[0] > arcs:
@@ -53,10 +55,11 @@ def before_attempt(work, kept):
 
 @jit(allocates=False)
 def after_rejection(work, kept):
-    """Undo arc lengths that wild stages have found, and solutions that any have. The search for a wheelset's arc length
-    starts from the last one. On a circle that its path goes round more than once, one that a wild stage has led to
-    another lap would be kept. Where several sets of windows fit, a patch keeps its own: that of a step that was tried
-    in vain would be no part of the motion."""
+    """Restore arc lengths after stages with far too large displacements, and solutions of patches after all stages.
+
+    The search for a wheelset's arc length starts from the last one; on a path of several laps of a circle it would stay
+    on a wrong lap. The normal problem can have several solutions, and a patch keeps the previous one. It is restored,
+    so that a rejected step has no effect on the motion."""
     arcs = work.arc_lengths.shape[0]
     if kept.shape[0] > arcs:
         copy_into(work.strips.memory.reshape(-1), kept[arcs:])
@@ -67,7 +70,7 @@ def after_rejection(work, kept):
 
 @jit(allocates=False)
 def outside(limit, state, model, work):
-    """Whether a wheelset is farther than a distance (m) from the track's centre."""
+    """Whether the lateral distance of a wheelset from the track's centre exceeds ``limit`` (m) or is NaN."""
     for k in range(model.bodies.wheelsets.shape[0]):
         at = STATE_SIZE * model.bodies.wheelsets[k]
         x, y, z = state[at], state[at + 1], state[at + 2]
@@ -82,8 +85,9 @@ def outside(limit, state, model, work):
 
 
 def why_outside(model, t, state, arc_lengths, limit=-1.0):
-    """Say how far the farthest wheelset is off the track's centre, from its rough arc lengths (k,); empty if none is
-    farther than the limit (m)."""
+    """Return a message with the maximum lateral distance of a wheelset from the track's centre.
+
+    ``arc_lengths`` (k,), m, may be approximate. The message is empty if no wheelset is beyond the limit (m)."""
     worst = 0.0
     for k, body in enumerate(model.bodies.wheelsets):
         y = state[STATE_SIZE * body + 1]
@@ -97,7 +101,7 @@ def why_outside(model, t, state, arc_lengths, limit=-1.0):
 
 @jit(allocates=False)
 def touching(work):
-    """Patches in the last evaluation."""
+    """Return the number of contact patches in the last evaluation."""
     total = 0
     for k in range(work.counts.shape[0]):
         total += work.counts[k, 0] + work.counts[k, 1]
@@ -106,7 +110,7 @@ def touching(work):
 
 @jit(allocates=False)
 def turn_rate(state, model, work):
-    """Rate at which the track turns under the wheelsets on average, about the vertical, rad/s."""
+    """Mean turning rate of the track's direction under the wheelsets, about the vertical, rad/s."""
     wheelsets, total, frame = model.bodies.wheelsets, 0.0, work.frame
     if model.track.tangent or not wheelsets.shape[0]:
         return 0.0

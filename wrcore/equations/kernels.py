@@ -1,4 +1,4 @@
-"""Which kernels a model runs: only what a scene has is compiled, and called by its address."""
+"""Choice of a model's kernels: only kernels that a scene needs are compiled; they are called by address."""
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from wrcore.wheels.modes import FRESH
 
 
 def looked_up(model):
-    """Coefficients of friction at which contact on the left and on the right rail is looked up: the largest ones; 0
-    where it is not."""
+    """Return the coefficients of friction of the lookup tables for the left and the right rail; 0 without a table.
+
+    If friction changes along a rail, its maximum is used."""
     strips, friction = model.contact.strips, model.friction
     if not strips.looked_up or not len(friction.points):
         return [strips.looked_up] * 2
@@ -26,7 +27,9 @@ def looked_up(model):
 
 
 def with_wheels(model):
-    """Contact of a model with what each wheel runs on where they differ, and with what its patches need."""
+    """Return the contact model of a model with wheel-specific contact models, if wheels or rails differ.
+
+    Patches on strips also get their lookup tables and late-compiled kernels."""
     contact, of_rails = model.contact, looked_up(model)
     if contact.geometries or of_rails[0] != of_rails[1]:
         wheels, bare = [], without_wheels(contact)
@@ -47,8 +50,9 @@ def with_wheels(model):
 
 
 def with_kernels(model, work):
-    """The model with the addresses of the kernels of its wheels, elements, joints and so on: only what it runs is
-    compiled."""
+    """Return the model with the addresses of its kernels (wheels, elements, joints, ...).
+
+    Only kernels that the model needs are compiled."""
     wrenches, contact = wheel_wrenches, model.contact
     if contact.strips.strips and len(work.motions):
         from wrcore.wheels.exact_force import strip_wrenches
@@ -63,7 +67,7 @@ def with_kernels(model, work):
         from wrcore.wheels.shaped_force import shaped_wrenches
 
         wrenches = shaped_wrenches
-    # what follows is compiled for the model as it will be
+    # kernels below are compiled for the type of the final model
     model = model._replace(contact=with_wheels(model._replace(contact=contact)), elements=with_laws(model.elements))
     kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
     if model.joints.equations:

@@ -1,4 +1,4 @@
-"""Equations of motion for many runs, one after the other: kernels are looked up and scratch arrays allocated once."""
+"""Equations of motion for a series of runs, which share kernels and scratch arrays."""
 
 import threading
 
@@ -15,8 +15,10 @@ from wrcore.wheels.contact_model import shaped
 
 
 def equations_of(model, shared=None):
-    """Equations of motion, as if new, that each thread turns from one model to the next; ``shared`` keeps them for the
-    next call, which takes them away."""
+    """Return the equations of motion of a model, with scratch arrays as if newly allocated.
+
+    Each thread reuses its equations for the next model of the same structure. ``shared`` is the cache of these
+    equations; the next call in a thread changes the equations that the last one returned."""
     if shared is None:
         return Equations(model)
     thread = "equations", threading.get_ident()
@@ -36,7 +38,9 @@ def equations_of(model, shared=None):
 
 
 def structure(model):
-    """What kernels are compiled and scratch arrays allocated for; models of equal structure can take turns in both."""
+    """Return the properties of a model that determine its kernels and scratch arrays.
+
+    Models of equal structure can use both in turn."""
     contact, strips = model.contact, model.contact.strips
     sizes = tuple(array.shape for array in _arrays(strips)) if strips.strips else ()
     return (
@@ -48,8 +52,9 @@ def structure(model):
 
 
 def with_kernels_of(model, other):
-    """The model with the addresses of another one of the same structure, from
-    `wrcore.equations.kernels.with_kernels`."""
+    """Return the model with the addresses of the kernels of another one of the same structure.
+
+    The other model comes from `wrcore.equations.kernels.with_kernels`."""
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
@@ -64,20 +69,20 @@ def with_kernels_of(model, other):
 
 
 def _with_laws_of(elements, other):
-    """The elements with the addresses of their laws, from others where these follow the same."""
+    """Return the elements with the addresses of their force laws, copied from ``other`` if the laws are equal."""
     if np.array_equal(elements.law[:, LAW], other.law[:, LAW]) and np.array_equal(elements.own, other.own):
         return elements._replace(laws=other.laws, own_laws=other.own_laws)
     return with_laws(elements)
 
 
 def _addresses(contact):
-    """Of the kernels of patches on strips, from a contact model that may have one for each wheel."""
+    """Return the addresses of the kernels of patches on strips from a contact model or its wheel-specific models."""
     strips = (*values_of(contact.wheels), contact)[0].strips
     return {"fallback": strips.fallback, "group": strips.group}
 
 
 def _arrays(part):
-    """All arrays of a tuple of arrays, tuples and numbers."""
+    """Yield all arrays of a nested tuple of arrays, tuples and numbers."""
     if isinstance(part, np.ndarray):
         yield part
     elif isinstance(part, tuple):

@@ -1,4 +1,4 @@
-"""A compiled scene for kernels, its scratch arrays, and the size of its state."""
+"""`Model`, a compiled scene for kernels, its scratch arrays `Workspace`, and the size of its state."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from wrcore.wheels.contact_model import COUNTERS, ContactModel
 from wrcore.wheels.motion import MOTION
 
 FRICTIONLESS = 1e-9
-"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
+"""Coefficient of friction that approximates zero: a static wheel load of 50 kN then has a friction force of 50 µN."""
 
 
 class Bodies(NamedTuple):
@@ -35,15 +35,15 @@ class Bodies(NamedTuple):
     spins: np.ndarray  # (n,) int: 1 for a body of revolution about its y axis whose frame does not spin along
     wheelsets: np.ndarray  # (k,) int: bodies with wheels
     independent: np.ndarray = np.zeros((0, 2), np.int64)
-    """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
-    difference of their rolling rates, left less right (rad/s), among the internal states."""
+    """(j, 2) int: number of a wheelset whose wheels rotate independently, and the index of half the difference of their
+    rolling rates, left minus right (rad/s), among the internal states."""
     axes: np.ndarray = np.zeros((0, 3, 3))
-    """(n, 3, 3): principal axes in the body's own as columns; of wheelsets in level axes, see
-    `wrcore.bodies.inertia`. Empty where all bodies' own axes are principal and all wheelsets bodies of revolution."""
+    """(n, 3, 3): principal axes as columns, in body axes; those of wheelsets in level axes, see
+    `wrcore.bodies.inertia`. Empty if all body axes are principal and all wheelsets are bodies of revolution."""
 
 
 class Model(NamedTuple):
-    """A compiled scene, for kernels."""
+    """Compiled scene for kernels."""
 
     bodies: Bodies
     contact: ContactModel
@@ -55,29 +55,29 @@ class Model(NamedTuple):
     alpha: float
     beta: float
     """Baumgarte's parameters, 1/s."""
-    wheels: int = 0  # address of the kernel that finds the rails' wrenches, see `with_kernels`
-    reactions: int = 0  # address of the kernel that adds the joints' reactions
+    wheels: int = 0  # address of the kernel of the rails' forces and moments on all wheels, see `with_kernels`
+    reactions: int = 0  # address of the kernel that adds the reactions of the joints
     friction: Schedules = pack_schedules([])
-    """Over arc length, for the left and the right rail, where friction is not the same everywhere; else empty."""
-    rail_friction: int = 0  # address of the kernel that looks it up
+    """Coefficient of friction over arc length for the left and the right rail; empty if it is constant."""
+    rail_friction: int = 0  # address of the kernel that interpolates this coefficient of friction
     drive: Drive = no_drive()  # motors, brakes and speed controller
-    torques: int = 0  # address of the kernel that adds their torques
-    flexible_track: FlexibleTrack = rigid_track()  # the track under each wheelset, if it is flexible
-    rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
-    controls: Controls = no_controls()  # control laws of the user's own
-    samples: int = 0  # address of the kernel that takes their samples
+    torques: int = 0  # address of the kernel that adds torques of motors and brakes
+    flexible_track: FlexibleTrack = rigid_track()  # flexible track under each wheelset
+    rails: int = 0  # address of the kernel of the rails' forces and moments on a flexible track
+    controls: Controls = no_controls()  # control laws of the user
+    samples: int = 0  # address of the kernel that samples the control laws
     crossing: Crossing = no_crossing()  # rails that change along the track
-    sections: int = 0  # address of the kernel that lays what the wheels see of them
-    strides: int = 0  # address of the kernel that keeps steps short on them
+    sections: int = 0  # address of the kernel that writes the rail section under each wheel
+    strides: int = 0  # address of the kernel that limits steps on changing rails and near check rails
     check_rails: CheckRails = no_check_rails()
-    guards: int = 0  # address of the kernel that adds their forces
-    slopes: int = 0  # address of the kernel of what patches change, for methods with a Jacobian
+    guards: int = 0  # address of the kernel that adds the forces of check rails
+    slopes: int = 0  # address of the kernel of the derivatives of contact forces, for methods with a Jacobian
 
 
 class Workspace(NamedTuple):
-    """Scratch arrays of one evaluation, and what it leaves for output."""
+    """Scratch arrays of one evaluation, with its results for output."""
 
-    rotations: np.ndarray  # (n + 1, 3, 3): of the bodies, and of the moving frame on a curved track
+    rotations: np.ndarray  # (n + 1, 3, 3): rotation matrices of the bodies, and of the moving frame on a curved track
     arc_lengths: np.ndarray  # (k,): last arc length of each wheelset, m; where the search for the next one starts
     turns: np.ndarray  # (n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin
     wrenches: np.ndarray  # (n, 6): force and moment about the centre of mass of each body
@@ -86,34 +86,35 @@ class Workspace(NamedTuple):
     motions: np.ndarray  # (k, 2, 15): `WheelMotion` of each wheel in its rail's frame
     rail_wrenches: np.ndarray  # (k, 2, 6): force and moment of the rails on each wheelset
     rails: np.ndarray  # (k, 2, 3, 3): axes of the rails' frames
-    shifts: np.ndarray  # (k, 2, 2): where rails are off their nominal places, m
+    shifts: np.ndarray  # (k, 2, 2): offsets of the rails from their nominal positions, left and up, m
     bounds: np.ndarray  # (k, 2): bound of planar detection's error (detection ``auto`` only), m
-    counters: np.ndarray  # (4,) int, see `wrcore.wheels.hertzian_force`
+    counters: np.ndarray  # (COUNTERS,) int, see `wrcore.wheels.contact_model`
     constraints: ConstraintWork
     frame: np.ndarray  # (3, 3): axes of the track's frame
     irregularity: np.ndarray
     strips: StripWork
     flexible_track: FlexibleTrackWork
     control: ControlWork
-    principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
-    seen: np.ndarray  # (k, 2, 4): which sections of rails that change the wheels' arrays hold
-    blocks: np.ndarray  # (k, 2) unsigned: which blocks of these, a bit for each
+    principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, if there are ``Bodies.axes``
+    seen: np.ndarray  # (k, 2, KNOWN): rail sections that the wheels' arrays contain, on changing rails
+    blocks: np.ndarray  # (k, 2) unsigned: blocks of these sections that are written, one bit each
     section: np.ndarray  # (ROWS + 4, m): scratch of :mod:`wrcore.track.changing_rails`
 
 
 def state_size(model):
-    """Length of the state vector: 13 numbers per body, then all states that belong to no body."""
+    """Return the length of the state vector: 13 numbers per body, then all internal states."""
     return STATE_SIZE * len(model.bodies.mass) + internal_states(model)
 
 
 def internal_states(model):
-    """Number of states that belong to no body: of force elements and the track, then that of the speed controller, then
-    those of control laws."""
+    """Return the number of internal states, which belong to no body.
+
+    Their order is: force elements and track, speed controller, control laws."""
     return model.elements.states + len(model.drive.control) + len(model.controls.start)
 
 
 def workspace(model):
-    """Allocate the scratch arrays for a model."""
+    """Allocate the scratch arrays of a model."""
     n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
     return Workspace(
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
@@ -130,11 +131,11 @@ def workspace(model):
 
 @jit(inline="always")
 def independent_at(bodies, j):
-    """Place in the state of half the difference of rolling rates of the j-th wheelset with independent wheels."""
+    """Index in the state of half the difference of rolling rates of the j-th wheelset with independent wheels."""
     return STATE_SIZE * bodies.mass.shape[0] + bodies.independent[j, 1]
 
 
 def frictionless(model):
-    """The model with next to no friction anywhere, in the creep law that costs least."""
+    """Return the model with the coefficient of friction `FRICTIONLESS` everywhere and the cheapest creep law."""
     contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
     return model._replace(contact=contact, friction=pack_schedules([]))

@@ -1,4 +1,4 @@
-"""What an evaluation of the equations of motion leaves besides the rates, at many states."""
+"""Results of evaluations of the equations of motion besides the rates, at many states."""
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from wrcore.track.track import arc_length_at
 
 @jit(allocates=False, nogil=True)
 def evaluations_at(times, states, equations, model, work, rates, patches, bounds):
-    """Fill ``rates`` (n, size), ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS; where there is one) and ``bounds`` of
-    planar detection's error (n, k, 2; m) at n times (s) and states; wheelsets in the model's order, left and right."""
+    """Fill rates, contact patches and error bounds of planar detection at n times (s) and states.
+
+    Shapes: ``rates`` (n, size), ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS; only rows in contact are written),
+    ``bounds`` (n, k, 2; m). Wheelsets are in the model's order, wheels left and right."""
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rates[i])
         for k in range(work.counts.shape[0]):
@@ -50,16 +52,18 @@ def _fill_check_rails(times, states, equations, model, work, rate, wrench, force
 
 
 def check_rail_history(equations, times, states):
-    """Forces of check rails on the backs of all wheels (n, k, 2; N), by `Equations`, whose scratch arrays are
-    overwritten, at n times (s) and states."""
+    """Return the forces of check rails on the backs of all wheels (n, k, 2; N) at n times (s) and states.
+
+    The scratch arrays of the `Equations` are overwritten."""
     forces = np.zeros((len(times), len(equations.work.motions), 2))
     _fill_check_rails(times, states, *equations.arguments, np.empty(states.shape[1]), np.zeros(6), forces)
     return forces
 
 
 def motion_history(equations, times, states):
-    """`WheelMotion` of all wheels (n, k, 2, 15), by `Equations`, whose scratch arrays are overwritten, at n times (s)
-    and states."""
+    """Return the `WheelMotion` of all wheels (n, k, 2, 15) at n times (s) and states.
+
+    The scratch arrays of the `Equations` are overwritten."""
     motions = np.empty((len(times), *equations.work.motions.shape))
     for t, state, found in zip(times, states, motions, strict=True):
         equations(t, state)
@@ -68,10 +72,11 @@ def motion_history(equations, times, states):
 
 
 def drive_history(equations, times, states):
-    """What motors, brakes and the speed controller did at n times (s) and states, by `Equations`, whose scratch arrays
-    are overwritten: torques on the wheelsets along their axles (N m) and relative rotation rates about these (rad/s),
-    (n, m) each; the controller's force at the rims (N) and the speed that it wants (m/s), (n, 2), zeros without one;
-    and the outputs of control laws, (n, o)."""
+    """Return torques and rates of motors and brakes, and outputs of controllers, at n times (s) and states.
+
+    Returns torques on the wheelsets along their axles (N m) and relative rotation rates about these (rad/s), (n, m)
+    each; the speed controller's force at the rims (N) and set speed (m/s), (n, 2), zeros without a controller; and the
+    outputs of control laws, (n, o). The scratch arrays of the `Equations` are overwritten."""
     model, rate = equations.arguments[1].value, np.empty(states.shape[1])
     shape = len(times), len(model.drive.rows)
     torques, rates, control = np.zeros(shape), np.zeros(shape), np.zeros((len(times), 2))

@@ -1,4 +1,4 @@
-"""Which functions of a user's own a run failed in."""
+"""Diagnosis of runs that fail in a user's function: name the function and the fault."""
 
 import numpy as np
 
@@ -9,16 +9,18 @@ from wrcore.kernels import own
 from wrcore.kernels.named_laws import function_of, name_of, said
 
 AHEAD = 0.0, 1e-9, 1e-6, 1e-3
-"""Times after the last accepted state at which the equations are looked at again, s."""
+"""Times after the last accepted state at which the equations are evaluated again, s."""
 
 
 def blame(model, t, state, rate, step=0.0):
-    """Words that name the own functions which give numbers that are not finite for finite ones at a time (s), a state
-    and its rate, both (size,), or soon after; ``step`` (s): the next one tried. Empty if there are none."""
+    """Return a part of a message that names the user's functions which return non-finite numbers for finite input.
+
+    They are evaluated at time ``t`` (s), ``state`` and ``rate`` (both (size,)), at the times `AHEAD` after it and after
+    ``step`` (s), the next attempted step. Empty if there is no such function."""
     controls = model.controls
     if not (len(model.elements.own) or len(controls.own) or len(model.contact.creep.source)):
         return ""
-    held = []  # by sampled laws
+    held = []  # names of sampled laws with non-finite held outputs or states
     for row, period, digest in zip(controls.rows, controls.period, controls.own, strict=True):
         places = [*controls.places[row[OUTPUTS] : row[OUTPUTS_END]], *range(row[STATES], row[STATES_END])]
         if period > 0.0 and not np.isfinite(state[places]).all():
@@ -39,7 +41,7 @@ def blame(model, t, state, rate, step=0.0):
 
 
 class LawWatch:
-    """The laws of the user in a model: what goes wrong in them while a kernel runs."""
+    """Monitor of the user's laws in a model, which reports their faults during a kernel call."""
 
     def __init__(self, model):
         elements, controls, creep = model.elements, model.controls, model.contact.creep
@@ -50,10 +52,11 @@ class LawWatch:
         self._before = [array.copy() for array in self._given]
 
     def fault_of(self, run, *arguments):
-        """Outcome of a kernel (None where an error left it), and what went wrong in the laws; Ctrl-C in one is raised
-        when the kernel has returned. Parameters that a law wrote to are what they were."""
+        """Run a kernel and return its outcome (None after an error) and a description of the fault in the user's laws.
+
+        Ctrl-C in a law is raised after the kernel has returned. Parameters that a law has changed are restored."""
         outcome, fault = None, ""
-        own.take_fault()  # of channels that were read meanwhile
+        own.take_fault()  # discard faults of output channels evaluated before this call
         try:
             outcome = run(*arguments)
         except Exception as error:  # of a compiled law

@@ -205,7 +205,7 @@ def press_patch(model, m, is_spatial, lean, lift, rows, q, filled, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def pressed_of(model, patch, lean, tilt, trust, outputs):
-    """Return the normal contact (`Pressed`) of a `LiftedPatch` for network ``outputs``, in axes inclined by ``lean``."""
+    """Return the normal contact (`Pressed`) of a `LiftedPatch` for network outputs, in axes inclined by ``lean``."""
     p = _pressed(model, patch.shape, trust, model.surrogate.corrections, outputs)
     px, pz = leaning(model.geometry, lean, p.px, p.pz + patch.tz)
     return Pressed(p.load, p.log_a, p.log_b, p.p_max, px, p.py + patch.aside, pz, p.angle - 0.5 * tilt, p.trust)
