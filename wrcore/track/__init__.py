@@ -1,1 +1,1 @@
-"""What wheels run on: the track's moving frame, track that gives, check rails, rails that change along the track."""
+"""Models of the track: its moving frame, flexible track, check rails, and rails that change along the track."""

@@ -1,15 +1,14 @@
-"""Rails that change along the track, and wheels out of round, under way: each wheel has a section of its own, laid anew
-as it goes.
+"""Rails that change along the track, and wheels out of round: the rail section under each wheel during a run.
 
-The kernels of search and patches know one rail profile per wheel. On such a rail it is the section that the wheel sees
-(`wrcore.contact.changing_rails.section_table`), interpolated for the arc length at which it is, written into the
-wheel's own arrays before its contact is looked for: those blocks of it that the search may look at. Where nothing
-changes nothing is written.
+The kernels of search and patches use one rail profile per wheel. On a changing rail this profile is the section at the
+wheel's arc length, interpolated in a table (`wrcore.contact.changing_rails.section_table`). It is written to the
+arrays of the wheel before contact is searched, but only the blocks that the search may use. Unchanged sections are not
+written again.
 
-A wheel out of round is a round one on a rail whose sections come again with each turn, as a corrugated rail's do with
-each wave. Its angle is that of rolling
-without slip, s over the mean of the wheelset's radii: it follows from the state. A run begins with round wheels; they
-take their shape over the first half turn.
+A wheel out of round is modelled as a round wheel on a rail whose sections repeat with each revolution, as those of a
+corrugated rail repeat with each wave. Its angle is that of rolling without slip, s over the mean of the wheelset's
+radii, and so follows from the state. A run begins with round wheels; the out-of-roundness is blended in over the first
+half revolution.
 """
 
 import math
@@ -44,51 +43,56 @@ from wrcore.wheels.contact_model import contact_of
 from wrcore.wheels.motion import MOTION, motion_of
 
 TRAVEL = 0.02
-"""Longest step of a run while a wheelset is on such a rail, m."""
+"""Maximum step of a run while a wheelset is on a changing rail, m."""
 
 BEGIN, STEP, LAST, PERIOD, LEAD, LEAN, START, END, FADE, STRIDE = range(10)
-"""Of a wheel's table: arc length of its first section, distance of the sections (m), number of the last one, distance
-after which they come again (in steps; 0: never), how far ahead a yaw moves what the wheel sees (m/rad), whether
-patches lean with the rail (1) or it is level (0), arc lengths between which sections that come again are there, length
-over which these come and go (m), and longest step on all (m)."""
+"""Columns of the layout of a table under a wheel. BEGIN: arc length of the first section (m). STEP: distance of the
+sections (m). LAST: index of the last section. PERIOD: distance after which sections repeat (in steps; 0: never).
+LEAD: distance by which yaw moves the wheel's section ahead (m/rad). LEAN: 1 if patches are inclined along the track as
+the rail, 0 if the rail is level. START, END: arc lengths between which repeating sections exist (m). FADE: length over
+which these are blended in and out (m). STRIDE: maximum step of a run there (m)."""
 N_LAYOUT = 10
+"""Number of columns of a layout."""
 
 NEIGHBOUR_CELLS = 2
-"""Cells on either side of those that are laid whose nodes are."""
+"""Margin in cells: nodes are also written for this many cells on either side of the written range."""
 
 BOUNDS = 2 * PARTS
-"""Rows of bounds of gaps per node of the wheel."""
+"""Number of rows of bounds of gaps per node of the wheel."""
 
 TABLE, PLACE, YAW, IN_STRETCH, BOUNDS_FROM = range(5)
-"""What is known of the section that a wheel's arrays hold: its table and place there, in steps, the yaw it is seen in,
-the stretch whose bounds of gaps are there, and from which row on."""
+"""Columns that identify the section in a wheel's arrays: its table, its position in the table (in steps), the yaw for
+which it was interpolated, the stretch whose bounds of gaps are written, and the first row of these."""
 KNOWN = 5
+"""Number of these columns."""
 
 
 class Crossing(NamedTuple):
-    """Sections of the rails that change, and under wheels out of round, for kernels; all arrays are empty where there
-    is none."""
+    """Sections of changing rails, and of rails under wheels out of round, for kernels; all arrays are empty without
+    these."""
 
     sections: np.ndarray
     """(tables, n, 2, ROWS, m): see `wrcore.contact.changing_rails.section_table.SectionTable`."""
     strips: np.ndarray
-    """(tables, 2, m): of the strips over it, see `SeenTable`."""
+    """(tables, 2, m): data of the wheel's strips over the sections, see `SectionTable`."""
     bounds: np.ndarray  # (tables, 1 + stretches, rows, blocks)
     tables: np.ndarray
-    """(k, 2, n) int: of each wheel the tables that it passes one after the other, -1 where there are less; all -1 for a
-    round one on a rail that is the same everywhere."""
-    laid: np.ndarray  # (k, 2, n, LAID): `BEGIN` to `STRIDE` of each
+    """(k, 2, n) int: tables that each wheel passes, in this order, filled up with -1; all -1 for a round wheel on a
+    rail that does not change."""
+    laid: np.ndarray  # (k, 2, n, N_LAYOUT): layout of each table, `BEGIN` to `STRIDE`
 
 
 def no_crossing():
-    """A `Crossing` where no rail changes."""
+    """Return an empty `Crossing`, for rails that do not change."""
     sizes = (0, 0, 2, ROWS, 0), (0, 2, 0), (0, 0, 0, 0)
     return Crossing(*map(np.zeros, sizes), np.zeros((0, 2, 1), np.int64), np.zeros((0, 2, 1, N_LAYOUT)))
 
 
 def crossing_of(tables, of_wheels):
-    """`Crossing` of a list of `SeenTable` and of what each wheel (2 k) passes one after the other: pairs of a table's
-    number and how it is laid (LAID,)."""
+    """Build the `Crossing` of a list of `SectionTable` and the tables that each wheel passes.
+
+    ``of_wheels`` (2 k wheels) contains for each wheel, in order, pairs of a table's number and its layout (N_LAYOUT,).
+    """
     parts = (_stacked([getattr(one, name) for one in tables]) for name in ("sections", "strips", "bounds"))
     shape = len(of_wheels), max(map(len, of_wheels))
     numbers, laid = np.full(shape, -1), np.zeros((*shape, N_LAYOUT))
@@ -99,21 +103,23 @@ def crossing_of(tables, of_wheels):
 
 
 def layout_of_rail(table, begin, lead):
-    """How the `SeenTable` of a rail is laid under a wheel whose tape circle is ``lead`` (m) from the middle."""
+    """Return the layout of a rail's `SectionTable` under a wheel whose tape circle is ``lead`` (m) from the middle."""
     return [begin, table.step, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, math.inf, 1.0, TRAVEL]
 
 
 def layout_of_wheel(table, start, angle, radius, shortest):
-    """How the `SeenTable` of a wheel out of round is laid: at the arc length ``start`` (m) the ``angle`` (rad) of a
-    wheelset with a mean ``radius`` (m) touches; what is not round is no shorter than ``shortest`` (m)."""
+    """Return the layout of the `SectionTable` of a wheel out of round.
+
+    At arc length ``start`` (m) the wheel's ``angle`` (rad) is in contact; ``radius`` (m) is the mean of the wheelset's
+    radii. ``shortest`` (m) is the minimum wavelength of the out-of-roundness, which limits the step."""
     begin, step = start + (table.begin - angle) * radius, table.step * radius
     turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)
     last, fade = len(table.sections) - 1, 0.5 * turn * radius
-    return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]  # without end, either way
+    return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]  # unlimited both ways
 
 
 def layout_of_corrugation(table, corrugation, lead):
-    """As `layout_of_rail`, of a `Corrugation`."""
+    """Return the layout of the `SectionTable` of a `Corrugation`; ``lead`` as for `layout_of_rail`."""
     begin, last, wave = corrugation.begin, len(table.sections) - 1, corrugation.wavelength
     stride, end = min(TRAVEL, 0.25 * wave), begin + corrugation.length
     return [
@@ -122,20 +128,22 @@ def layout_of_corrugation(table, corrugation, lead):
 
 
 def _stacked(arrays):
-    """Arrays of one dimension but of different sizes in one, with zeros behind the smaller ones."""
+    """Stack arrays of equal dimension but different shapes; smaller ones are padded with zeros at the end."""
     sizes = np.max([array.shape for array in arrays], axis=0)
     return np.array([np.pad(array, [(0, more) for more in sizes - array.shape]) for array in arrays])
 
 
 def with_copied_arrays(geometry):
-    """A `ContactGeometry` with arrays of its own where sections are written."""
+    """Return a `ContactGeometry` with copies of the arrays to which sections are written."""
     names = "rail", "scan_rail", "along", "zone_gaps"
     return geometry._replace(**{name: getattr(geometry, name).copy() for name in names})
 
 
 @jit(allocates=False)
 def lay_sections(model, state, work):
-    """Write the sections that the wheels see, whose motions are in ``work``, into their arrays: what may touch them."""
+    """Write the rail sections under all wheels to the wheels' arrays, for the motions in ``work``.
+
+    Only blocks near the wheel, which may come into contact, are written."""
     crossing = model.crossing
     for k in range(crossing.tables.shape[0]):
         s = arc_length_at(model, state, work, k)
@@ -157,7 +165,7 @@ def lay_sections(model, state, work):
                     share = min(s - laid[START], laid[END] - s) / laid[FADE]
                 if share <= 0.0:
                     place = last
-            if not place > 0.0:  # a stage that is not finite, too
+            if not place > 0.0:  # also for NaN, in a non-finite stage
                 place = 0.0
             place = min(place, last)
             changed = 0.0 < place < last
@@ -180,8 +188,10 @@ def lay_sections(model, state, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _blocks_at_hand(model, bounds, stretch, state, k, wheel, work):
-    """Blocks of the scan that the search may look at, a bit for each, where the ``bounds`` of a stretch tell: those
-    near the wheel, and their neighbours; else all. Has these bounds written where the search looks them up."""
+    """Return the blocks of the scan that the search may use, one bit each.
+
+    If the ``bounds`` of a stretch are applicable, these are the blocks near the wheel and their neighbours, else all.
+    The bounds are written to the search's array ``zone_gaps``."""
     contact, known = contact_of(model.contact, k, wheel), work.seen[k, wheel]
     geometry, m = contact.geometry, motion_of(work.motions[k, wheel])
     y, z = displacement(model, state, k, wheel)
@@ -202,7 +212,7 @@ def _blocks_at_hand(model, bounds, stretch, state, k, wheel, work):
 
 @jit(allocates=False, forceinline=True)
 def _passed(crossing, k, wheel, s, yaw):
-    """Which of its tables a wheel is on, or was on last."""
+    """Return the index of the table on which a wheel is, or was last."""
     at = 0
     for i in range(1, crossing.tables.shape[2]):
         laid = crossing.laid[k, wheel, i]
@@ -213,16 +223,20 @@ def _passed(crossing, k, wheel, s, yaw):
 
 @jit(allocates=False, forceinline=True)
 def _section_index(laid, s):
-    """Place of an arc length (m) among the sections, in steps; of a wheel's from `PAD` to a turn beyond it."""
+    """Return the position of an arc length (m) among the sections, in steps.
+
+    With repeating sections it is at least `PAD` and less than one period larger."""
     place = (s - laid[BEGIN]) / laid[STEP]
     return PAD + (place - PAD) % laid[PERIOD] if laid[PERIOD] > 0.0 else place
 
 
 @jit(allocates=False)
 def interpolate(sections, strips, laid, place, yaw, share, scratch, geometry, curved, low, high):
-    """Write the section at a place, for a wheel that yaws by so many steps per metre, into the cells of the scan from
-    ``low`` to before ``high`` and into the nodes there; with second derivatives if it is ``curved``. Below a ``share``
-    of 1 it goes over into the plain rail. ``scratch`` is (ROWS + 4, m)."""
+    """Write the section at ``place`` (in steps) to the cells of the scan and to their nodes.
+
+    Cells are those from ``low`` to before ``high``. ``yaw`` is the wheel's yaw in steps per metre. Second derivatives
+    are written if ``curved``. A ``share`` below 1 blends the section with the plain rail. ``scratch`` is
+    (ROWS + 4, m)."""
     rail, along, cells = geometry.rail, geometry.along, (geometry.rail.shape[0] - 1) // PER_CELL
     low, high = max(int(low) - MARGIN, 0), min(int(high) - MARGIN, cells)
     first, size = PER_CELL * max(low - NEIGHBOUR_CELLS, 0), min(PER_CELL * (high + NEIGHBOUR_CELLS) + 2, rail.shape[0])
@@ -252,7 +266,7 @@ def _step_of(place, last):
 
 @jit(allocates=False, fastmath=FUSED)
 def _fill_weights(leads, place, yaw, begin, end, weights):
-    """Write the four weights of cubic Hermite polynomials at nodes."""
+    """Fill ``weights`` (4, m) with those of cubic Hermite polynomials at the nodes from ``begin`` to before ``end``."""
     for j in range(np.uint64(begin), np.uint64(end)):
         t = place + yaw * leads[j]
         s = 1.0 - t
@@ -269,7 +283,7 @@ def _mix(low, high, low_rate, high_rate, weights, begin, end, out):
 
 @jit(allocates=False)
 def _fade(plain, share, first, end, section):
-    """Leave a ``share`` of what a section has more than the plain rail's."""
+    """Reduce the difference of a section from the plain rail's to a ``share``, in place."""
     for row in range(ROWS):
         for j in range(first, end):
             section[row, j] = plain[row, j] + share * (section[row, j] - plain[row, j])
@@ -277,14 +291,14 @@ def _fade(plain, share, first, end, section):
 
 @jit(allocates=False)
 def _keep_level(plain, rail, along, first, end):
-    """Have the wheel out of round touch a rail that is no higher than it is, and level."""
+    """Keep the rail under a wheel out of round level: store the height difference in ``along`` and no inclination."""
     for j in range(first, end):
         along[j, LIFT], along[j, LEAN_AHEAD] = plain[j] - rail[j, 0], 0.0
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _lay_nodes(curvatures, section, rail, along, curved, first, end):
-    """Write a section into the nodes of a rail."""
+    """Write a section to the nodes of a rail from ``first`` to before ``end``."""
     for j in range(np.uint64(first), np.uint64(end)):
         rail[j, 0], rail[j, 1] = section[HEIGHT, j], section[SLOPE, j]
         x, curvature = section[AHEAD, j], curvatures[j]
@@ -298,7 +312,7 @@ def _lay_nodes(curvatures, section, rail, along, curved, first, end):
 
 @jit(allocates=False, fastmath=FUSED)
 def _lay_cells(rail, scan_rail, low, high):
-    """Write cells of the scan, from ``low`` to before ``high``: cubics through the nodes at their ends, reserves and
+    """Write the cells of the scan from ``low`` to before ``high``: cubics through the nodes at their ends, reserves and
     inclinations."""
     cells = (rail.shape[0] - 1) // PER_CELL
     inverse = 1.0 / SCAN_STEP
@@ -324,8 +338,9 @@ def _lay_cells(rail, scan_rail, low, high):
 
 @jit(allocates=False)
 def shorten_step(model, state, work, clock, at):
-    """Shorten the next step, the entry of ``clock`` (s), so that it neither begins before what a wheel sees changes and
-    ends beyond that nor is longer than the stride there."""
+    """Shorten the next step, ``clock[at]`` (s), on changing rails and with wheels out of round.
+
+    The step ends at the latest where a changing range begins; within such a range its maximum is the STRIDE (m)."""
     crossing = model.crossing
     for k in range(crossing.tables.shape[0]):
         first = STATE_SIZE * model.bodies.wheelsets[k] + VELOCITY
@@ -340,7 +355,7 @@ def shorten_step(model, state, work, clock, at):
 
 @jit(allocates=False, forceinline=True)
 def _unchanged(laid, s):
-    """How far a wheel may go in a step, m: to where what it sees of a table changes, or the stride."""
+    """Maximum distance of a wheel in one step, m: up to the next change of its section, at least the STRIDE."""
     end = laid[BEGIN] + laid[STEP] * laid[LAST]
     left = max(laid[BEGIN] - s, s - end, laid[STRIDE])
     if laid[PERIOD] > 0.0:

@@ -1,13 +1,13 @@
-"""Check rails: rails beside running rails that hold wheels by the backs of their flanges, past crossings say.
+"""Check rails: rails next to the running rails that guide wheels by the backs of their flanges, e.g. at crossings.
 
-A wheel's back is a plane across its axle, bounded by a circle; a check rail's face is upright, up to a height over the
-running surface. They overlap, where they do, between the two points of that circle at that height, ahead of the axle
-and behind it. Half of the force acts at either point,
+The back of a wheel is a plane normal to its axle, bounded by a circle. The face of a check rail is a vertical plane up
+to a height over the running surface. Contact is evaluated at the two points of the circle at this height, one ahead of
+the axle and one behind it. Half of the force acts at each point,
 
     N = K/2 max(0, penetration there),   friction mu N u/sqrt(u^2 + v0^2) against the sliding velocity u in the face,
 
-so that a wheel that yaws is touched ahead or behind, and nothing steps where it does not. The rail stands on the
-ground: what it takes does not bend a flexible track.
+so that a yawing wheel has contact ahead or behind, and the force is continuous at zero yaw. The check rail stands on
+the ground: its force does not deflect a flexible track.
 """
 
 import math
@@ -22,33 +22,34 @@ from wrcore.track.track import arc_length_at
 from wrcore.wheels.motion import MOTION
 
 SIDE, BEGIN, END, FACE, FLARE, OPENING, BACK, CHORD, DOWN, STIFFNESS, FRICTION = range(11)
-"""Of a check rail: 1 beside the left, -1 beside the right running rail; arc lengths (m); distance of its face from the
-middle of the track; length of its flares, and how far they open (m); distance of the wheels' backs from the middle of
-the axle; how far ahead of the axle, and below it, the circle of a back crosses its upper edge (m); stiffness (N/m) and
-coefficient of friction."""
+"""Columns of a check rail. SIDE: 1 next to the left, -1 next to the right running rail. BEGIN, END: arc lengths (m).
+FACE: distance of its face from the middle of the track (m). FLARE, OPENING: length and lateral opening of its flares
+(m). BACK: distance of the wheels' backs from the middle of the axle (m). CHORD, DOWN: distances ahead of and below the
+axle at which the circle of a wheel's back crosses the rail's upper edge (m). STIFFNESS (N/m), FRICTION: coefficient."""
 COLUMNS = 11
+"""Number of columns of a check rail."""
 
 SLIDING = 0.02
-"""Sliding velocity at which friction has 71 % of what it can have, m/s. Chosen."""
+"""Sliding velocity v0 at which friction reaches 71 % of its maximum, m/s. Chosen."""
 
 STRIDE = 0.05
-"""Longest step of a run beside a check rail, m."""
+"""Maximum step of a run at a check rail, m."""
 
 
 class CheckRails(NamedTuple):
     """Check rails, for kernels."""
 
-    rows: np.ndarray  # (k, n, COLUMNS), of each wheelset
+    rows: np.ndarray  # (k, n, COLUMNS): n check rails for each of k wheelsets
 
 
 def no_check_rails():
-    """`CheckRails` where there are none."""
+    """Return empty `CheckRails`."""
     return CheckRails(np.zeros((0, 0, COLUMNS)))
 
 
 @jit(allocates=False)
 def face_at(row, s):
-    """Distance of a check rail's face from the middle of the track at an arc length, m; far off where there is none."""
+    """Distance of a check rail's face from the middle of the track at arc length ``s``, m; -1 km outside its range."""
     if not row[BEGIN] < s < row[END]:
         return -1e3
     into = min(s - row[BEGIN], row[END] - s)
@@ -57,8 +58,10 @@ def face_at(row, s):
 
 @jit(allocates=False)
 def check_force(row, s, aside, motion, wrench):
-    """Normal force of a check rail on a wheel with a motion in its rail's frame, N, where that rail has moved ``aside``
-    (m); adds what acts on the wheelset to its ``wrench`` about its centre."""
+    """Compute the normal force of a check rail on a wheel, N, and add force and moment on the wheelset to ``wrench``.
+
+    ``motion`` is the wheel's motion in the frame of its running rail, which is displaced laterally by ``aside`` (m).
+    The moment is about the wheelset's centre."""
     side, total = row[SIDE], 0.0
     if motion[MOTION.side] != side:
         return total
@@ -83,7 +86,7 @@ def check_force(row, s, aside, motion, wrench):
 
 @jit(allocates=False)
 def press_check_rails(model, state, work):
-    """Add what check rails do to the wrenches of the rails on all wheels, for their motions in ``work``."""
+    """Add the forces and moments of check rails to those of the rails on all wheels, for the motions in ``work``."""
     rows = model.check_rails.rows
     for k in range(work.rail_wrenches.shape[0]):
         s = arc_length_at(model, state, work, k)
@@ -95,7 +98,9 @@ def press_check_rails(model, state, work):
 
 @jit(allocates=False)
 def shorten_near_check_rails(model, state, work, clock, at):
-    """As `shorten_step`, and for wheelsets that come to a check rail or are beside one."""
+    """Shorten the next step, ``clock[at]`` (s), on changing rails (`shorten_step`) and near check rails.
+
+    A wheelset must not pass the begin of a check rail in a step, and moves at most `STRIDE` at one."""
     shorten_step(model, state, work, clock, at)
     for k in range(work.motions.shape[0]):
         speed, s = abs(work.motions[k, 0, MOTION.vx]), arc_length_at(model, state, work, k)

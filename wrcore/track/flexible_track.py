@@ -1,25 +1,25 @@
-"""Flexible track: a piece of track under each wheelset that runs along with it, on springs and dampers to the ground.
+"""Flexible track: a co-moving piece of track under each wheelset, on springs and dampers to the ground.
 
-Under each wheelset a piece of track carries both rails. Its freedoms q are
+Under each wheelset a piece of track carries both rails. Its degrees of freedom q are
 
     left rail lateral, vertical; right rail lateral, vertical; sleeper lateral, vertical, roll
 
-(m and rad; left and up positive, in the axes of the rails' frames), the sleeper's only where there is one. With the
-forces f of the wheels on the rails, q obeys
+(m and rad; left and up positive, in the axes of the rails' frames); those of the sleeper exist only in models with a
+sleeper. With the forces f of the wheels on the rails, the equation of motion is
 
     M q'' + C q' + K q = B f,   or, for rails without mass,   C q' + K q = f.
 
-The piece runs along with its wheelset: nothing is handed on from one place of the track to the next. The wheel meets a
-rail that is displaced by q and moves at q': in the rail's frame the wheelset's place and velocity are less by these.
+The piece moves with its wheelset: neighbouring positions of the track are not coupled. The rail is displaced by q and
+moves at q'; in the rail's frame these are subtracted from the wheelset's position and velocity.
 
-Without mass, q' follows from forces that depend on it, by creepages and contact damping. The faster a rail gives way,
-the less it is pushed, so that there is one solution; Newton's method finds it for all rails at once, with steps that
-are halved where they do not come closer. Derivatives by differences cost as much as two steps: they are taken at the
-first one, and again where a step does not do what it should; else Broyden's update (Math. Comp. 19 (1965) 577) follows
-the last step. It starts from rest each time: a state has one rate, whatever was before.
+Without mass, q' follows from forces that depend on q' by creepages and contact damping. The faster a rail yields, the
+smaller is the force on it, so that the solution is unique. Newton's method solves for all rails at once and halves
+steps that do not reduce the residual. Derivatives by differences cost as much as two steps. They are computed in the
+first step, and again if a step reduces the residual too little; otherwise Broyden's update (Math. Comp. 19 (1965) 577)
+is used. The iteration always starts from q' = 0, so that the rate depends on the state only.
 
-A friction that falls with slip can push more the faster a rail gives way, and leave a weak damper no balance, or
-several. Evaluations that end without one are counted.
+If friction falls with slip, the force can grow with q'. With a weak damper there can then be no solution, or several.
+Evaluations without a solution are counted.
 """
 
 import math
@@ -37,66 +37,66 @@ from wrcore.wheels.modes import BARE, ELLIPSES, PATCHES_HELD, SPEEDS_GIVEN, WREN
 from wrcore.wheels.motion import MOTION
 
 RAILS = 4
-"""Freedoms of both rails; those of the sleeper come after them."""
+"""Number of degrees of freedom of both rails; those of the sleeper follow them."""
 
 DIFFERENCE, LAST_STEP, MOST_STEPS = 1e-7, 1e-8, 60
-"""Newton's method for rails without mass: difference of velocities (m/s), length of its last step (m/s; the error left
-is a small part of it), and most steps."""
+"""Newton's method for rails without mass: velocity difference for derivatives (m/s), step length at which it ends (m/s;
+the remaining error is a small fraction of it), and maximum number of steps."""
 
 LEAST_GAIN, LARGEST_LEFT = 0.1, 0.5
-"""Part of what is left that a full step has to take off, and largest part left with which derivatives are kept."""
+"""Minimum relative reduction of the residual by a full step; maximum ratio of residuals at which derivatives are kept.
+"""
 
 SLIDING = 0.9
-"""Part of friction beyond which a wheel slides."""
+"""Ratio of tangential force to friction times normal force above which a wheel is treated as sliding."""
 
 UNBALANCED = 1e-4
-"""Part of the forces on a rail that is left where there is no balance."""
+"""Residual, relative to the forces on a rail, above which an evaluation counts as one without a solution."""
 
 
 class FlexibleTrack(NamedTuple):
-    """The track under each wheelset, for kernels; of a rigid one all arrays are empty."""
+    """Track under each wheelset, for kernels; all arrays are empty for rigid track."""
 
     mass: np.ndarray  # (d,): kg, and kg m^2 in roll; zeros for rails without mass
     stiffness: np.ndarray  # (d, d): K
     damping: np.ndarray  # (d, d): C
     first: int
-    """Place of the first of its states among the internal states: wheelset after wheelset, q, then q' where there are
-    masses."""
+    """Index of its first state among the internal states. For each wheelset these are q, then q' if it has mass."""
 
 
 class FlexibleTrackWork(NamedTuple):
-    """Scratch arrays for each wheelset and freedom of its rails (k, 4); none for a rigid track."""
+    """Scratch arrays for each wheelset and degree of freedom of its rails (k, 4); empty for rigid track."""
 
     ground: np.ndarray  # (k, 4): velocities of the wheelset's centre over the ground, m/s
     speeds: np.ndarray  # (k, 4): q', m/s
     forces: np.ndarray  # (k, 4): f, N
-    known: np.ndarray  # (k, 4): f without a difference in q', N
+    known: np.ndarray  # (k, 4): f before the difference in q' is added, N
     residuals: np.ndarray  # (k, 4): C q' + K q - f, N
-    began: np.ndarray  # (k, 4): the same where the step began, N
-    steps: np.ndarray  # (k, 4): of Newton's method, m/s
-    slopes: np.ndarray  # (k, 4, 2): derivatives of f by both q' of its rail (last index), N s/m
-    matrix: np.ndarray  # (k, 2, 2, 2): derivatives of a rail's residuals by its q' (last index), N s/m
-    inverse: np.ndarray  # (k, 2, 2, 2): of it, as held for `SPEEDS_GIVEN`
-    by_speed: np.ndarray  # (k, 4, 6): derivatives of the wheels' wrenches by q', held with it
-    left: np.ndarray  # (k, 2): size of a rail's residuals, N
-    parts: np.ndarray  # (k, 2): of Newton's full steps
+    began: np.ndarray  # (k, 4): residuals at the start of the step, N
+    steps: np.ndarray  # (k, 4): steps of q' in Newton's method, m/s
+    slopes: np.ndarray  # (k, 4, 2): derivatives of f with respect to both q' of its rail (last index), N s/m
+    matrix: np.ndarray  # (k, 2, 2, 2): derivatives of a rail's residuals with respect to its q' (last index), N s/m
+    inverse: np.ndarray  # (k, 2, 2, 2): inverse of such a matrix, held for `SPEEDS_GIVEN`, m/(N s)
+    by_speed: np.ndarray  # (k, 4, 6): derivatives of the wheels' forces and moments with respect to q', held as well
+    left: np.ndarray  # (k, 2): norm of a rail's residuals, N
+    parts: np.ndarray  # (k, 2): fractions of Newton's full steps
     power: np.ndarray  # (1,): f q', summed over all rails, W; 0 for a rigid track
-    unbalanced: np.ndarray  # (1,) int: counts evaluations in which rails without mass found no balance
-    counted: np.ndarray  # (COUNTERS,) int: the wheels' counters where an evaluation began
+    unbalanced: np.ndarray  # (1,) int: number of evaluations without a solution for rails without mass
+    counted: np.ndarray  # (COUNTERS,) int: the wheels' counters at the start of an evaluation
 
 
 def rigid_track():
-    """A `FlexibleTrack` of a rigid track."""
+    """Return an empty `FlexibleTrack`, for rigid track."""
     return FlexibleTrack(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), 0)
 
 
 def track_size(track):
-    """Number of states of the track under one wheelset."""
+    """Return the number of states of the track under one wheelset."""
     return len(track.mass) * (2 if np.any(track.mass) else 1)
 
 
 def track_work(track, wheelsets):
-    """Scratch arrays for a `FlexibleTrack` and a number of wheelsets."""
+    """Allocate the scratch arrays for a `FlexibleTrack` and a number of wheelsets."""
     k = wheelsets if len(track.mass) else 0
     shapes = [(k, RAILS)] * 7 + [(k, RAILS, 2), (k, 2, 2, 2), (k, 2, 2, 2), (k, RAILS, 6), (k, 2), (k, 2), (1,)]
     counts = (np.zeros(size, np.int64) for size in (1, COUNTERS))
@@ -104,13 +104,14 @@ def track_work(track, wheelsets):
 
 
 def track_places(model):
-    """Places of the track's states in the state, wheelset by wheelset: (k, size)."""
+    """Return the indices of the track's states in the state vector, one row for each wheelset: (k, size)."""
     size, first = track_size(model.flexible_track), STATE_SIZE * len(model.bodies.mass) + model.flexible_track.first
     return first + size * np.arange(len(model.bodies.wheelsets))[:, None] + np.arange(size)
 
 
 def rails_at(model, state, k):
-    """Displacements of the rails under the k-th wheelset: left and right, lateral and vertical (m), shape (2, 2)."""
+    """Return the displacements of the rails under the k-th wheelset, m, shape (2, 2): rows left and right rail, columns
+    lateral and vertical."""
     if not len(model.flexible_track.mass):
         return np.zeros((2, 2))
     return state[track_places(model)[k, :RAILS]].reshape(2, 2)
@@ -118,7 +119,7 @@ def rails_at(model, state, k):
 
 @jit(allocates=False, forceinline=True)
 def first_state_index(model, k):
-    """Place of the first state of the track under the k-th wheelset in the state."""
+    """Index in the state vector of the first state of the track under the k-th wheelset."""
     track = model.flexible_track
     size = track.mass.shape[0] * (1 if track.mass[0] == 0.0 else 2)
     return STATE_SIZE * model.bodies.mass.shape[0] + track.first + size * k
@@ -126,7 +127,7 @@ def first_state_index(model, k):
 
 @jit(allocates=False, forceinline=True)
 def displacement(model, state, k, wheel):
-    """How far the rail under a wheel is displaced to the left and up, m."""
+    """Return the displacement of the rail under a wheel to the left and up, m; zeros on rigid track."""
     if model.flexible_track.mass.shape[0] == 0:
         return 0.0, 0.0
     at = first_state_index(model, k) + 2 * wheel
@@ -135,9 +136,10 @@ def displacement(model, state, k, wheel):
 
 @jit(allocates=False)
 def flexible_wrenches(model, state, work, rate, mode):
-    """Wrenches of the rails on all wheels, as by the kernel of the wheels, and the rates of the track's states, written
-    into ``rate``; the motions in ``work``, over rails at rest, become those over the rails as they move. While wrenches
-    are held, the rates alone, by the forces found last."""
+    """Compute forces and moments of the rails on all wheels, and write the rates of the track's states to ``rate``.
+
+    The motions in ``work``, relative to rails at rest, become those relative to the moving rails. In the mode
+    `WRENCHES_HELD` only the rates are computed, from the last forces."""
     if not mode & WRENCHES_HELD:
         _find_wrenches(model, state, work, mode)
     _write_rates(model, state, work, rate)
@@ -145,7 +147,7 @@ def flexible_wrenches(model, state, work, rate, mode):
 
 @jit(allocates=False)
 def _find_wrenches(model, state, work, mode):
-    """Wrenches on all wheels, forces on the rails, and the rails' speeds."""
+    """Compute the forces and moments on all wheels, the forces on the rails, and the rails' speeds."""
     scratch, massless, given = work.flexible_track, model.flexible_track.mass[0] == 0.0, mode & SPEEDS_GIVEN
     if massless and not given:
         mode &= ~BARE
@@ -180,7 +182,7 @@ def _find_wrenches(model, state, work, mode):
 
 @jit(allocates=False)
 def _step_on(model, state, work):
-    """Lead the speeds of rails without mass, and the wrenches, on by a step with the slopes that are held."""
+    """Advance speeds of rails without mass, and forces on the wheels, by one Newton step with held derivatives."""
     scratch = work.flexible_track
     _find_residuals(model, state, scratch)
     for k in range(scratch.speeds.shape[0]):
@@ -195,7 +197,7 @@ def _step_on(model, state, work):
 
 @jit(allocates=False)
 def _write_rates(model, state, work, rate):
-    """Rates of the track's states by the forces on the rails, or by their speeds where they have no mass."""
+    """Write the rates of the track's states to ``rate``: from the forces on the rails, or their speeds without mass."""
     track, scratch = model.flexible_track, work.flexible_track
     d, massless = track.mass.shape[0], track.mass[0] == 0.0
     for k in range(scratch.speeds.shape[0]):
@@ -211,7 +213,9 @@ def _write_rates(model, state, work, rate):
 
 @jit(allocates=False)
 def _press(model, work, faster, mode):
-    """Find the wrenches and the forces on the rails at the rails' speeds, in one direction (< 0: none) a bit faster."""
+    """Compute the forces and moments on all wheels and the forces on the rails at the rails' speeds.
+
+    `DIFFERENCE` is added to the speeds in the direction ``faster`` (0 lateral, 1 vertical, < 0 none)."""
     scratch = work.flexible_track
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
@@ -225,8 +229,10 @@ def _press(model, work, faster, mode):
 
 @jit(allocates=False)
 def _follow_where_sliding(model, work):
-    """Let rails whose wheels slide begin at the speed at which these would not: where friction saturates it does not
-    tell the way, from where it is steep Newton's steps stay short of the balance. Returns whether one slides."""
+    """Set the initial speed of rails under sliding wheels to that without slip; return whether a wheel slides.
+
+    In full sliding the creep force is constant, so that Newton's method has no direction. The speed without slip is in
+    the steep range of the creep force, from which Newton's steps do not overshoot."""
     scratch, contact, sliding = work.flexible_track, model.contact, False
     for k in range(scratch.speeds.shape[0]):
         for wheel in range(2):
@@ -247,8 +253,9 @@ def _follow_where_sliding(model, work):
 
 @jit(allocates=False)
 def _find_slopes(model, work, mode):
-    """Derivatives of the forces on the rails by the rails' speeds, where forces are known; patches stay. For patches on
-    strips ellipses stand in, as in a Jacobian: the derivatives only lead to the solution."""
+    """Compute the derivatives of the forces on the rails with respect to the rails' speeds, at constant patches.
+
+    Ellipses replace patches on strips, as in a Jacobian: the derivatives affect only the convergence."""
     scratch, rough = work.flexible_track, mode | ELLIPSES
     if model.contact.strips.strips > 0:
         _press(model, work, -1, rough)
@@ -263,7 +270,7 @@ def _find_slopes(model, work, mode):
 
 @jit(allocates=False)
 def _renew_matrix(track, scratch, k, wheel, a, b, differences):
-    """Derivatives of one rail's residuals a and b: by differences, or those before with Broyden's update."""
+    """Update the derivatives of one rail's residuals a and b: by differences (``slopes``), or by Broyden's update."""
     matrix, first = scratch.matrix[k, wheel], 2 * wheel
     if differences:
         for i in range(2):
@@ -280,8 +287,9 @@ def _renew_matrix(track, scratch, k, wheel, a, b, differences):
 
 @jit(allocates=False)
 def _step(track, scratch, k, wheel, differences):
-    """Newton's step of one rail, or half of the last one, back, where that came no closer. Returns whether the next
-    step wants derivatives by differences."""
+    """Do a Newton step of one rail, or halve the last step if it did not reduce the residual enough.
+
+    Returns whether the next step needs derivatives by differences."""
     first, matrix, before = 2 * wheel, scratch.matrix[k, wheel], scratch.left[k, wheel]
     a, b, step = scratch.residuals[k, first], scratch.residuals[k, first + 1], scratch.steps[k, first : first + 2]
     left = math.sqrt(a * a + b * b)
@@ -304,7 +312,7 @@ def _step(track, scratch, k, wheel, differences):
 
 @jit(allocates=False)
 def _find_residuals(model, state, scratch):
-    """Fill the residuals of all rails; whether one is out of balance."""
+    """Fill the residuals of all rails; return whether the residual of a rail is too large (`UNBALANCED`)."""
     track, out = model.flexible_track, False
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
@@ -318,13 +326,15 @@ def _find_residuals(model, state, scratch):
 
 @jit(allocates=False)
 def _moves(scratch, k, wheel):
-    """Whether the last step of a rail was long enough for another one."""
+    """Whether the last Newton step of a rail exceeds `LAST_STEP`, so that another step is needed."""
     return abs(scratch.steps[k, 2 * wheel]) > LAST_STEP or abs(scratch.steps[k, 2 * wheel + 1]) > LAST_STEP
 
 
 @jit(allocates=False)
 def _give_way(model, state, work, mode):
-    """Find the speeds of rails without mass, with all wrenches there; each evaluation counts from ``counted`` on."""
+    """Solve for the speeds of rails without mass, with forces and moments at the solution.
+
+    Before each evaluation the wheels' counters are reset to ``counted``, so that only the last one is counted."""
     track, scratch, differences = model.flexible_track, work.flexible_track, True
     scratch.left[:] = math.inf
     for n in range(MOST_STEPS):
@@ -334,7 +344,7 @@ def _give_way(model, state, work, mode):
         fresh, differences, moving = differences, False, False
         for k in range(scratch.speeds.shape[0]):
             for wheel in range(2):
-                if n == 0 or _moves(scratch, k, wheel):  # else it has arrived
+                if n == 0 or _moves(scratch, k, wheel):  # else this rail has converged
                     differences |= _step(track, scratch, k, wheel, fresh)
                     moving |= _moves(scratch, k, wheel)
         for k in range(COUNTERS):

@@ -1,4 +1,4 @@
-"""Numbers that change along the track or over time: tables with straight lines between their points."""
+"""Quantities that change along the track or over time: tables with linear interpolation between their points."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ class Schedules(NamedTuple):
 
 
 def pack_schedules(tables):
-    """Put tables, each an array (q, 2) of at least one point, one behind the other."""
+    """Pack tables, each an array (q, 2) of at least one point, into one `Schedules`."""
     return Schedules(
         np.cumsum([0, *map(len, tables)], dtype=np.int64), np.concatenate([np.zeros((0, 2)), *tables]).astype(float)
     )
@@ -23,7 +23,7 @@ def pack_schedules(tables):
 
 @jit(allocates=False)
 def scheduled(schedules, table, x):
-    """Value of a table at ``x``: linear between its points, constant beyond its ends."""
+    """Value of a table at the abscissa ``x``: linear between its points, constant beyond its ends."""
     points, low, high = schedules.points, schedules.starts[table], schedules.starts[table + 1] - 1
     if not x > points[low, 0]:
         return points[low, 1]

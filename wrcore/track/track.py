@@ -1,13 +1,13 @@
-"""A wheelset on a curved or irregular track: each rail's own frame, in which it runs straight along x.
+"""Motion of a wheelset on curved or irregular track, in the frame of each rail, whose x axis is along the rail.
 
-At the wheelset's arc length s the track has a frame [t n b] (Eq. 3). A rail stands at (Y, Z) of that cross-section,
-with the widening and its irregularity, and runs in a direction that leaves t by the slopes of both (and by the twist of
-a cant ramp). Pose and velocities are turned into the rail's frame, the contact is solved there as on a tangent track,
-and the wrench is turned back. The rail does not move (but for :mod:`wrcore.track.flexible_track`): only the
-direction of its surface changes along the track.
+At the wheelset's arc length s the track has a frame [t n b] (Eq. 3). A rail is at (Y, Z) of this cross-section, which
+includes gauge widening and irregularity. Its direction deviates from t by the slopes of both, and by the twist of a
+cant ramp. Position, attitude and velocities are transformed to the rail's frame. Contact is solved there as on tangent
+track, and forces and moments are transformed back. The rail does not move, except on flexible track
+(:mod:`wrcore.track.flexible_track`): only the direction of its surface changes along the track.
 
-Within a patch the rail counts as straight. Its curvature kappa enters Hertz's relative curvature; what is left out is
-its sagitta kappa x^2/2 over the longitudinal distance x of the contact from the cross-section (0.5 um at x = 17 mm and
+Within a patch the rail is straight. Its curvature kappa is part of Hertz's relative curvature. The sagitta kappa x^2/2
+over the longitudinal distance x of the contact from the cross-section is neglected (0.5 µm at x = 17 mm and
 R = 300 m).
 """
 
@@ -29,14 +29,14 @@ from wrcore.wheels.motion import MOTION
 class TrackModel(NamedTuple):
     """Path and irregularity, for kernels."""
 
-    tangent: bool  # straight, level and perfect: none of this module runs
+    tangent: bool  # straight and level track without irregularity: the functions of this module are not called
     path: PathData
     irregularity: IrregularityData
 
 
 @jit(allocates=False, fastmath=FUSED)
 def turned_into(frame, x, y, z):
-    """Components of a vector along the columns of a frame."""
+    """Return the components of a vector along the columns of a frame."""
     return (
         frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
         frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z,
@@ -46,7 +46,7 @@ def turned_into(frame, x, y, z):
 
 @jit(allocates=False, fastmath=FUSED)
 def turned_back(frame, x, y, z):
-    """Vector whose components along the columns of a frame are given."""
+    """Return the vector with given components along the columns of a frame."""
     return (
         frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
         frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z,
@@ -56,7 +56,9 @@ def turned_back(frame, x, y, z):
 
 @jit(allocates=False, fastmath=FUSED)
 def _rail_frame(frame, lateral, vertical, out):
-    """Frame of a rail whose direction leaves t by slopes towards n and b: its own t, n, b as columns of ``out``."""
+    """Fill ``out`` with the frame of a rail whose direction deviates from t by slopes towards n and b.
+
+    The columns are the t, n and b of the rail."""
     tx, level = 1.0 / math.sqrt(1.0 + lateral * lateral + vertical * vertical), 1.0 / math.sqrt(1.0 + lateral * lateral)
     ty, tz = lateral * tx, vertical * tx
     nx, ny = -lateral * level, level
@@ -69,13 +71,13 @@ def _rail_frame(frame, lateral, vertical, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def rail_motions(track, distances, state, at, axle, guess, frame, values, rails, shifts, motions):
-    """A wheelset's motion in the frames of its two rails; returns its arc length (m), sought from ``guess``, NaN if
-    there is none.
+    """Fill a wheelset's motion in the frames of its two rails, and return its arc length (m).
 
-    ``distances`` are those of the profiles' origins from the track's centre line (m), ``at`` is the start of the
-    wheelset's state, ``axle`` its rotation matrix; ``frame`` (3, 3) and ``values`` (3, 4) are scratch. Fills ``rails``
-    (2, 3, 3), axes of the left and the right rail's frame; ``shifts`` (2, 2), where it is off its nominal place, left
-    and up (m); and ``motions`` (2, 15), each a `wrcore.wheels.motion.WheelMotion`, but for the friction.
+    The search for the arc length starts from ``guess``; the result is NaN if there is none. ``distances`` are those of
+    the profiles' origins from the track's centre line (m), ``at`` is the start of the wheelset's state, ``axle`` its
+    rotation matrix; ``frame`` (3, 3) and ``values`` (3, 4) are scratch. Fills ``rails`` (2, 3, 3), axes of the left and
+    the right rail's frame; ``shifts`` (2, 2), offsets from their nominal positions, left and up (m); and ``motions``
+    (2, 15), each a `wrcore.wheels.motion.WheelMotion` except for the friction.
     """
     s = arc_length_of(track.path, state[at], state[at + 1], state[at + 2], guess)
     station = track_frame(track.path, s, frame)
@@ -110,8 +112,9 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
 
 @jit(allocates=False, fastmath=FUSED)
 def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
-    """Turn what was found in the frames of two rails (from `rail_motions`) into absolute axes, and patches to where
-    they are in the track's."""
+    """Transform forces and moments from the frames of two rails (`rail_motions`) to absolute axes, in place.
+
+    Positions of patches are shifted by the offsets of the rails, to the frame of the track."""
     for wheel in range(2):
         rail, wrench = rails[wheel], wrenches[wheel]
         store(turned_back(rail, wrench[0], wrench[1], wrench[2]), wrench)
@@ -123,8 +126,10 @@ def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
 
 @jit(allocates=False, fastmath=FUSED)
 def moving_frame(track, speed, t, offset, axes):
-    """Origin (m), velocity (m/s) and angular velocity (rad/s), in absolute axes, of the track's frame that runs along
-    the track at constant speed, at an ``offset`` (m) from its start; fills ``axes`` (3, 3)."""
+    """Return origin (m), velocity (m/s) and angular velocity (rad/s), in absolute axes, of the moving track frame.
+
+    The frame moves along the track at constant speed and is at arc length ``offset`` (m) at t = 0. Its axes are written
+    to ``axes`` (3, 3)."""
     station = track_frame(track.path, offset + speed * t, axes)
     along, left, up = frame_turn(station)
     velocity = (speed * axes[0, 0], speed * axes[1, 0], speed * axes[2, 0])
@@ -133,14 +138,15 @@ def moving_frame(track, speed, t, offset, axes):
 
 @jit(allocates=False)
 def arc_length_at(model, state, work, k):
-    """Arc length of the k-th wheelset after its rails were looked up in this evaluation, m."""
+    """Arc length of the k-th wheelset, m; valid after `rail_motions` of this evaluation."""
     return state[STATE_SIZE * model.bodies.wheelsets[k]] if model.track.tangent else work.arc_lengths[k]
 
 
 @jit(allocates=False)
 def fill_rail_friction(model, state, work):
-    """Write the friction coefficients of the rails under all wheels into the wheels' motions, which are those of
-    ``state``, from the model's two schedules over arc length: left and right rail."""
+    """Write the coefficients of friction of the rails under all wheels to the wheels' motions in ``work``.
+
+    They are interpolated in the model's two schedules over arc length, for the left and the right rail."""
     for k in range(model.bodies.wheelsets.shape[0]):
         s = arc_length_at(model, state, work, k)
         for wheel in range(2):
@@ -149,7 +155,7 @@ def fill_rail_friction(model, state, work):
 
 @jit(allocates=False)
 def angles_in(frame, body):
-    """Roll, yaw and pitch (rad) of a body's rotation matrix in a frame of the track."""
+    """Return roll, yaw and pitch (rad) of a body in a frame of the track, from its rotation matrix ``body``."""
     ax, ay, az = turned_into(frame, body[0, 1], body[1, 1], body[2, 1])
     _, _, forward = turned_into(frame, body[0, 0], body[1, 0], body[2, 0])
     _, _, upward = turned_into(frame, body[0, 2], body[1, 2], body[2, 2])
@@ -158,8 +164,10 @@ def angles_in(frame, body):
 
 @jit
 def track_poses(track, states, at, guess):
-    """Poses (n, 6) of the body whose state starts ``at`` in the track's frame, arc length s, y, z (m), roll, yaw and
-    pitch (rad), and that frame (n, 3, 3), for each row of ``states``; ``guess`` is about the first s."""
+    """Return positions and attitudes (n, 6) of a body in the track's frame, and this frame (n, 3, 3), for each state.
+
+    Columns are arc length s, y, z (m), roll, yaw and pitch (rad). The body's state starts at index ``at`` in each row
+    of ``states``; the search for the first s starts from ``guess`` (m)."""
     poses, axes, body = np.empty((len(states), 6)), np.empty((len(states), 3, 3)), np.empty((3, 3))
     s = guess
     for i in range(len(states)):
