@@ -1,1 +1,1 @@
-"""Time integration: methods, their tableaus, choice of steps, reference integrators."""
+"""Time integration: methods, their tableaus, step size control, reference integrators."""

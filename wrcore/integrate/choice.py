@@ -1,12 +1,12 @@
-"""By which method a run by ``auto`` goes on: now and then it looks at what it costs, and tries the other.
+"""Choice of the integration method of a run by ``auto``, which compares costs at intervals and tries the other method.
 
-Rodas5 is for stiffness, Kutta's method for motion that wants short steps anyway: rough rails at speed, wheelsets that
-hunt from flange to flange, a crossing. Where it begins no run knows what it will meet, so it begins by Rodas5. What
-Kutta's method costs where stability bounds its steps is known beforehand, by the fastest rate (it takes two thirds of
-the evaluations of Tsit5 then, and errs less); all else is found by going on by the other method for a while, which is
-no waste: those steps are of the run. Work is counted, not timed, so that a run has the same bits on any machine, and
-notes are part of a checkpoint. `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of
-equal error.
+Rodas5 is efficient for stiff motion. Kutta's method is efficient for motion that needs short steps anyway: rough rails
+at speed, wheelsets that hunt from flange to flange, a crossing. A run begins with Rodas5. If stability limits the steps
+of Kutta's method, its cost is estimated from the fastest rate (it then needs two thirds of the evaluations of Tsit5,
+with a smaller error). Otherwise the cost is measured by continuing with the other method for some steps. These steps
+are part of the run, so that no work is lost. Work is counted, not timed: a run is bitwise identical on any machine.
+The notes of the choice are part of a checkpoint. `python -m tests.integrate.auto` compares the result with the
+cheapest method of equal error.
 """
 
 import math
@@ -27,74 +27,75 @@ from wrcore.kernels.jit import jit
 from wrcore.wheels.modes import ELLIPSES
 
 CHOICES = ("rodas5", "rk4")
-"""What ``auto`` goes by, in the beginning by the first."""
+"""Methods of ``auto``; a run begins with the first one."""
 
 STABLE, EXPLICIT = 2.0, 4.0
-"""Length of the steps of Kutta's method where stability bounds them, times the fastest rate as it is found here; and
-evaluations that one takes."""
+"""Step length of Kutta's method at its stability bound times the rate of `fastest_rate`; evaluations per step."""
 
 LINEAR, CONTACTS = 0.6, 3.0
-"""Price of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations, as timed: of six stages
-with a Jacobian 4.8 for a wheelset, 6 for a coach, 8.5 for a metro car."""
+"""Cost of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations. Timed costs of six stages
+with a Jacobian are 4.8 for a wheelset, 6 for a coach, 8.5 for a metro car."""
 
 BALANCE = 3.2
-"""Price of the balance of rails without mass, in evaluations: explicit methods look for it in each, those that go by
-implied speeds in two of a step."""
+"""Cost of solving for the speeds of rails without mass, in evaluations. Explicit methods solve in each evaluation,
+methods with implied speeds in two evaluations of a step."""
 
 FIRST, LAST, APART = {"rodas5": 16, "rk4": 120}, {"rodas5": 320, "rk4": 1600}, {"rodas5": 2.0, "rk4": 4.0}
-"""Attempts by a method, once its steps have found their length and a trial is over, before the first look, and between
-two at most: there are so many times as many each time. Those by Kutta's method always try the other."""
+"""Intervals between comparisons for each method, in attempts: the first after a trial, the maximum, and the factor by
+which the interval grows each time. Runs by Kutta's method try the other method at each comparison."""
 
 COUNTED, TIGHT, FALLING = {"rodas5": (0.65, 1.3), "rk4": (1.0, 1.0)}, 1e-4, 0.3
-"""Factors on the work of a method where the two are compared: the least one and the one at the tolerance ``TIGHT`` or a
-looser one. Between them the factor falls as the tolerance to the power of ``FALLING``: the least one holds from 1e-5.
-At 1e-4 the error of Kutta's method is a tenth where a wheelset hunts. With 1.3 the error of `auto` there is 1.6 um in
-8 s, with 1.0 it is 8 um. At 1e-5 this accuracy is not needed: 0.65 compares evaluations alone. With 1.3 a run at 1e-5
-took 1.1 to 2.2 times the evaluations of Rodas5."""
+"""Factors on the work of a method in comparisons: the minimum, and the factor at the tolerance ``TIGHT`` and looser
+ones. Between them the factor is proportional to the tolerance to the power of ``FALLING`` and reaches the minimum at
+1e-5. At 1e-4 the error of Kutta's method is a tenth of that of Rodas5 where a wheelset hunts. With 1.3 the error of
+`auto` there is 1.6 µm in 8 s, with 1.0 it is 8 µm. At 1e-5 this accuracy is not needed: 0.65 compares only evaluations.
+With 1.3 a run at 1e-5 took 1.1 to 2.2 times the evaluations of Rodas5."""
 
 GROWING, TRIED = 8, 16
-"""Attempts of a trial in which its steps find their length, and those that are judged."""
+"""Attempts of a trial in which its step size settles, and attempts whose cost is then compared."""
 
 WORTH, HOPELESS = 0.9, 5.0
-"""Of what the method costs the other has to promise less, and what costs so many times as much while its steps still
-grow is tried no further."""
+"""The other method is tried if its estimated cost is below 0.9 of the present cost. While its step size settles, the
+trial is stopped if it costs 5 times as much as the method before."""
 
 PASSES, SETTLING, DISTURBANCE = 30, 10, 1e-8
-"""Evaluations for the fastest rate, those that count, and the size of the disturbance in m (velocities, angles: as in
-the tolerances)."""
+"""Number of evaluations for the fastest rate, number of these that are averaged, and the size of the disturbance in m
+(velocities and angles are scaled as in the tolerances)."""
 
 SETTLED, BEGINNING, ON_TRIAL = range(3)
-"""Phases between two looks."""
+"""Phases between two comparisons: no trial, step size of a trial settles, cost of a trial is measured."""
 
 
 class Note(IntEnum):
-    """Places in the notes of a run by ``auto``."""
+    """Indices in the notes of a run by ``auto``."""
 
     DUE = 0
-    """Attempts at which the next look is due."""
+    """Number of attempts at which the next comparison is due."""
     INTERVAL = 1
-    """Attempts between it and the one before, trials left out."""
+    """Attempts between the last two comparisons, without trials."""
     PHASE = 2
+    """`SETTLED`, `BEGINNING` or `ON_TRIAL`."""
     OTHER = 3
-    """What the other method was last seen to cost, evaluations per s, as `COUNTED`."""
+    """Last measured cost of the other method, evaluations per s, with the factor `COUNTED`."""
     USED = 4
-    """Of which methods the run has made use: bit k for that at place k in `CHOICES`."""
+    """Methods that the run has used: bit k for the method at index k in `CHOICES`."""
     WORK = 5
-    """All that was done up to the last look, in evaluations."""
+    """Work up to the last comparison, in evaluations."""
     SINCE = 6
-    """Time of the last look, s, and counters then, in three more places."""
+    """Time of the last comparison, s, followed by three counters at this time."""
 
 
 NOTES = Note.SINCE + 4
+"""Number of notes."""
 
 
 def no_notes():
-    """Of a run by a method that was asked for: it never looks."""
+    """Return the empty notes of a run by a given method, which never compares methods."""
     return np.zeros(0)
 
 
 def first_notes(method, memory):
-    """Notes of a run that begins by a method."""
+    """Return the notes of a run that begins with ``method``."""
     notes = np.zeros(NOTES)
     notes[Note.OTHER], notes[Note.INTERVAL] = np.inf, FIRST[method]
     _mark(notes, memory, method, ON_TRIAL, GROWING)
@@ -102,7 +103,7 @@ def first_notes(method, memory):
 
 
 def checked_notes(checkpoint):
-    """Notes of a checkpoint, a copy; an InputError where no run has left them so."""
+    """Return a copy of the notes of a checkpoint; raise an InputError if they are not valid notes of a run."""
     notes = no_notes() if checkpoint.notes is None else np.asarray(checkpoint.notes)
     if notes.shape == (0,):
         return no_notes()
@@ -117,41 +118,44 @@ def checked_notes(checkpoint):
 
 
 def used(notes, method):
-    """Methods that a run has made use of, by name."""
+    """Return the names of the methods that a run has used, separated by commas."""
     return ", ".join(m for k, m in enumerate(CHOICES) if int(notes[Note.USED]) >> k & 1) if len(notes) else method
 
 
 def attempts(counters):
-    """Steps that were tried so far."""
+    """Return the number of attempted steps: accepted and rejected ones."""
     return int(counters[STEPS] + counters[REJECTED])
 
 
 def work(model, method, evaluations, tried, jacobians):
-    """What was done, in evaluations of the right-hand side: so many, attempts, and Jacobians."""
+    """Return the work of a method, in evaluations of the right-hand side.
+
+    It includes the cost of linear systems in ``tried`` attempts, of ``jacobians``, and of the speeds of massless rails.
+    """
     stages = len(ROSENBROCK[method].nodes) if method in ROSENBROCK else 0
     balances = 2 * tried if method in ROSENBROCK and ROSENBROCK[method].reuse == 1 else evaluations
     return evaluations + LINEAR * stages * tried + CONTACTS * jacobians + _balance(model) * balances
 
 
 def _balance(model):
-    """Price of a balance, 0 where rails are rigid or have masses."""
+    """Return the cost of solving for the speeds of massless rails, in evaluations; 0 for other tracks."""
     return BALANCE if without_mass.py_func(model) else 0.0
 
 
 def counted(method, tolerance):
-    """Factor on the work of a method at a relative tolerance, see `COUNTED`."""
+    """Return the factor on the work of a method at a relative tolerance, see `COUNTED`."""
     least, largest = COUNTED[method]
     return max(least, largest * min(1.0, tolerance / TIGHT) ** FALLING)
 
 
 def work_of(model, checkpoint):
-    """What a run by ``auto`` that ended with a checkpoint did in all but its looks, in evaluations."""
+    """Return the work of a run by ``auto`` up to its checkpoint, in evaluations, without that of comparisons."""
     notes = checkpoint.notes
     return notes[Note.WORK] + work(model, checkpoint.method, *(_reached(checkpoint.memory) - notes[Note.SINCE :])[1:])
 
 
 def method_after(notes, method, model, equations, memory, tolerance):
-    """The method by which a run of a relative ``tolerance`` goes on at a look; notes the look."""
+    """Compare the methods at a relative ``tolerance``, update the notes and return the method for the next steps."""
     other = CHOICES[1 - CHOICES.index(method)]
     gone = _reached(memory) - notes[Note.SINCE :]
     done, phase, interval = work(model, method, *gone[1:]), int(notes[Note.PHASE]), notes[Note.INTERVAL]
@@ -160,7 +164,7 @@ def method_after(notes, method, model, equations, memory, tolerance):
     notes[Note.WORK] += done
     if phase != SETTLED and spent > notes[Note.OTHER] * (HOPELESS if phase == BEGINNING else 1.0):
         notes[Note.OTHER] = spent
-        _mark(notes, memory, other, SETTLED, interval)  # where it came from
+        _mark(notes, memory, other, SETTLED, interval)  # back to the method before the trial
         return other
     if phase == BEGINNING:
         _mark(notes, memory, method, ON_TRIAL, TRIED)
@@ -176,7 +180,7 @@ def method_after(notes, method, model, equations, memory, tolerance):
 
 
 def _promised(method, model, equations, memory, tolerance):
-    """Evaluations per s, as `COUNTED`, that a method may take from here on, at least."""
+    """Return a lower bound of a method's cost from the present state on, evaluations per s with factor `COUNTED`."""
     if method in ROSENBROCK:
         return 0.0
     rate = fastest_rate(model, equations, memory.clock[T], memory.state)
@@ -189,7 +193,7 @@ def _reached(memory):
 
 
 def _mark(notes, memory, method, phase, ahead):
-    """Note where a run by a method is, and that the next look is due so many attempts ahead."""
+    """Write time, counters and phase to the notes; the next comparison is due after ``ahead`` further attempts."""
     if phase == SETTLED:
         notes[Note.INTERVAL] = ahead
     notes[Note.PHASE], notes[Note.DUE] = phase, attempts(memory.counters) + ahead
@@ -198,8 +202,10 @@ def _mark(notes, memory, method, phase, ahead):
 
 
 def fastest_rate(model, equations, t, state):
-    """Largest absolute eigenvalue (1/s) of the equations of motion at a state, roughly, by the power method; NaN where
-    the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
+    """Estimate the maximum absolute eigenvalue (1/s) of the equations of motion at a state by the power method.
+
+    The result is NaN if the state's rate is not finite. Counters and starting values of searches in ``equations`` are
+    not changed."""
     grow, arguments = power_method(model, equations, t, state)
     with _undisturbed(equations.work):
         grow(*arguments)
@@ -207,7 +213,7 @@ def fastest_rate(model, equations, t, state):
 
 
 def power_method(model, equations, t, state):
-    """The kernel of `fastest_rate`, and its arguments, the first of which it fills with the growth of each pass."""
+    """Return the kernel of `fastest_rate` and its arguments; it fills the first one with the growth of each pass."""
     direction, scratch = np.random.default_rng(0).normal(size=len(state)), np.empty((3, len(state)))
     return _grow, (np.empty(PASSES), _disturbances(model, state), direction, scratch, t, state, *equations.arguments)
 
@@ -229,7 +235,7 @@ def _grow(growths, unit, direction, scratch, t, state, equations, model, work):
 
 @jit(allocates=False)
 def _mean_size(vector):
-    """Root of the mean square."""
+    """Root mean square of the components of a vector."""
     total = 0.0
     for value in vector:
         total += value * value
@@ -237,14 +243,14 @@ def _mean_size(vector):
 
 
 def _disturbances(model, state):
-    """Of each component of a state, by which its rates are differenced."""
+    """Return the disturbance of each component of a state for differences of rates."""
     unit = step_tolerances(model, 0.0, DISTURBANCE)
     return unit[0] + pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * unit[1]
 
 
 @contextmanager
 def _undisturbed(work):
-    """Leave counters and places of ``work`` as they are."""
+    """Restore counters and starting values of searches in ``work`` on exit."""
     kept = [(array, array.copy()) for array in (*places(work), work.counters)]
     yield
     for array, before in kept:

@@ -1,10 +1,10 @@
-"""The compiled run: explicit pairs, and what every method needs (error norm, step control, dense output, stop).
+"""Compiled integration by explicit pairs, and functions of all methods: error norm, step control, dense output, stop.
 
-A kernel advances by a number of attempts and returns; everything it knows lies in a `Memory`, so that neither where it
-pauses nor where a run is taken up again changes a bit of the result. Steps are never cut to meet an output time or
-the end: outputs are interpolated, and the last step reaches beyond the end.
+A kernel advances by a number of attempts and returns. Its complete state is in a `Memory`, so that results are bitwise
+identical wherever it pauses or a run is continued. Steps are never shortened to end at an output time or at the end of
+the run: outputs are interpolated, and the last step ends beyond the end.
 
-What a step may err is in `wrcore.integrate.tolerances`.
+The tolerated error of a step is defined in `wrcore.integrate.tolerances`.
 """
 
 import math
@@ -27,40 +27,43 @@ RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
 """Outcomes of a chunk of attempts."""
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+"""Step size control: safety factor, minimum and maximum factor from one step to the next."""
+
 LEAST_STEP = 1e-13
-"""Smallest step as a fraction of the time reached, or of 1 s where that is more."""
+"""Minimum step as a fraction of the time reached, or of 1 s if this is larger."""
 
 COLLAPSE = 3
-"""Rejections in a row that make a collapse of the step size: each may shorten the step fivefold."""
+"""Consecutive rejections that count as a collapse of the step size: each can shorten the step fivefold."""
 
 STILL = (0.0, 0.0)
-"""Axes that do not turn."""
+"""Rate and angle of axes that do not turn."""
 
 FIRST_STEP = 1e-5
-"""Length of the first attempt of a run with step control, s: below every time scale of a vehicle. The steps after it
-may grow fivefold each."""
+"""Length of the first attempt of a run with step control, s: below all time scales of a vehicle. The next steps can
+grow fivefold each."""
 
 T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP = range(7)
-"""Places in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
-step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the
-run (s), and the step that the factorised matrix belongs to (s)."""
+"""Indices in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
+step, minimum accepted step (s), start of the run (s), and step of the factorised matrix (s). The minimum is over steps
+that the error limits: the step after them grows by less than the factor `GROW`."""
 
 STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, COLLAPSES = range(6)
 HAS_RATE, RETRY, AGE, SINCE_FULL, TOUCHING = range(6, 11)
 COUNTERS_SIZE = 11
-"""Places in the counters; COLLAPSES: steps rejected `COLLAPSE` times or more. The last five belong to the control: the
-rate at the state is known, rejections since the last accepted step, steps since the Jacobian was refreshed (-1: there
-is none), contact refreshes since the last full one, patches at the state."""
+"""Indices in the counters; COLLAPSES: steps rejected `COLLAPSE` times or more. The last five are for control. HAS_RATE:
+1 if the rate at the state is computed. RETRY: rejections since the last accepted step. AGE: steps since the last
+refresh of the Jacobian (-1: none). SINCE_FULL: contact refreshes since the last full one. TOUCHING: patches at the
+state."""
 
 
 class Control(NamedTuple):
-    """What a run is asked for."""
+    """Tolerances and limits of a run."""
 
     tolerances: np.ndarray
-    """(2, n): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
-    fixed_step: float  # s; 0 for steps by the error estimate
+    """(2, n): tolerated error of a step for each component of the state, see `wrcore.integrate.tolerances`."""
+    fixed_step: float  # s; 0: step size control by the error estimate
     longest_step: float  # s
-    limit: float  # a state `outside` of it ends the run, m
+    limit: float  # maximum lateral distance of a wheelset from the track's centre, m; see `outside`
 
 
 class Memory(NamedTuple):
@@ -77,14 +80,14 @@ class Memory(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Arrays that hold nothing between two attempts."""
+    """Scratch arrays, whose content is not used in the next attempt."""
 
     trial: np.ndarray  # (n,)
     slope: np.ndarray  # (n,)
     defect: np.ndarray  # (n,)
     between: np.ndarray  # (n,)
     still: np.ndarray  # (n,): zeros
-    places: np.ndarray  # (k,): where searches started before the attempt, see `wrcore.equations.interface.kept_size`
+    places: np.ndarray  # (k,): saved starting values of searches, see `wrcore.equations.interface.kept_size`
 
 
 class Record(NamedTuple):
@@ -96,7 +99,7 @@ class Record(NamedTuple):
 
 
 def new_memory(state, start, stages, first_step):
-    """Memory of a run that has not begun: ``start`` and ``first_step`` in s, ``stages`` of the method."""
+    """Return the `Memory` of a new run: ``start`` and ``first_step`` in s, number of ``stages`` of the method."""
     clock = np.array([start, start, first_step, 1.0, np.inf, start, 0.0])
     counters = np.zeros(COUNTERS_SIZE, np.int64)
     counters[AGE] = -1
@@ -105,15 +108,16 @@ def new_memory(state, start, stages, first_step):
 
 
 def new_scratch(size, places):
-    """Scratch arrays for a state vector of a length and a number of places."""
+    """Allocate the `Scratch` for a state vector of length ``size`` and a number of saved starting values."""
     return Scratch(*np.zeros((5, size)), np.zeros(places))
 
 
 @jit(allocates=False)
 def error_size(tolerances, rate, bodies, new, errors):
-    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed. ``rate``
-    is the step's `pace`. The internal states make one more body. NaN or infinite if any number of the state is not
-    finite."""
+    """Maximum over all bodies of a step's error norm: the root mean square of 13 components relative to tolerances.
+
+    ``rate`` is the step's `pace` (1/s). All internal states together count as one further body. The result is NaN or
+    infinite if any component of the state is not finite."""
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):
         first = STATE_SIZE * b
@@ -132,11 +136,11 @@ def error_size(tolerances, rate, bodies, new, errors):
 
 @jit(allocates=False)
 def judge(control, exponent, hold, memory, error):
-    """Accept or reject an attempt by its error and choose the next step's length, which stays if it could grow by less
-    than ``hold``; ``exponent`` is the order of the error estimate in h.
+    """Accept or reject an attempt by its error, and set the length of the next step; return whether it is accepted.
 
-    Proportional-integral control with exponents 0.7 and 0.4 (Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533-554):
-    where stability bounds the step it settles on the bound, while control by the last error alone swings about it.
+    The length does not change if it could grow by less than the factor ``hold``; ``exponent`` is the order of the error
+    estimate in h. Proportional-integral control with exponents 0.7 and 0.4 (Gustafsson, ACM Trans. Math. Softw. 17
+    (1991) 533-554) converges to the stability bound; control by the last error only oscillates about it.
     """
     clock, counters = memory.clock, memory.counters
     step = clock[NEXT]
@@ -164,12 +168,12 @@ def judge(control, exponent, hold, memory, error):
 
 @jit(allocates=False)
 def accept(control, memory, trial, step):
-    """Make the trial state the state reached."""
+    """Accept a step: advance time and counters, and copy the trial state to the state reached."""
     clock, counters = memory.clock, memory.counters
     counters[STEPS] += 1
     clock[T_OLD] = clock[T]
     clock[T] += step
-    if control.fixed_step > 0.0:  # no drift
+    if control.fixed_step > 0.0:  # no accumulated rounding
         clock[T] = clock[START] + counters[STEPS] * step
     if control.fixed_step > 0.0 or clock[NEXT] < GROW * step:
         clock[SMALLEST] = min(clock[SMALLEST], step)
@@ -180,8 +184,9 @@ def accept(control, memory, trial, step):
 
 @jit(allocates=False)
 def take_samples(control, memory, scratch, equations, model, work):
-    """Let sampled control laws take what is due at the time reached, and have the next step, or the next but one, end
-    where the next sample is; steps of a stated length stay."""
+    """Take the samples of control laws that are due, and adapt the next step to the time of the next sample.
+
+    The next step, or the one after it, ends at the next sample (fixed steps are not changed)."""
     if model.samples == 0:
         return
     clock, sampling = memory.clock, work.control.sampling
@@ -198,15 +203,14 @@ def take_samples(control, memory, scratch, equations, model, work):
 
 @jit(allocates=False)
 def keep_short(control, memory, model, work):
-    """Have the next step end where the rails begin to change along the track, and stay short on them; steps of a stated
-    length stay."""
+    """Shorten the next step where rails change along the track and near check rails (fixed steps are not changed)."""
     if model.strides != 0 and control.fixed_step == 0.0:
         call_address(model.strides, model, memory.state, work, memory.clock, NEXT)
 
 
 @jit(allocates=False)
 def interpolate(dense, theta, scale, stages, out):
-    """Set ``out`` (n,) to the sum of the stages, times ``scale``, by the weights of a dense output at ``theta``."""
+    """Fill ``out`` (n,) with the dense output at ``theta``: the weighted sum of the stages times ``scale``."""
     out[:] = 0.0
     for i in range(stages.shape[0]):
         weight = 0.0
@@ -219,9 +223,10 @@ def interpolate(dense, theta, scale, stages, out):
 
 @jit(allocates=False)
 def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
-    """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
-    are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
-    stages at the step's end, see `wrcore.jacobian.moving_axes`."""
+    """Write the outputs up to the time reached, and return RUNNING, COMPLETED, DERAILED or TOO_SMALL.
+
+    ``dense`` (s, d) are the coefficients of the dense output, for stages times ``scale``. ``turn`` and ``drift``
+    describe the axes of the stages at the step's end, see `wrcore.jacobian.moving_axes`."""
     clock = memory.clock
     times, reached = record.times, record.reached[0]
     while reached < times.shape[0] and times[reached] <= clock[T]:
@@ -248,7 +253,7 @@ def write_outputs(control, dense, scale, turn, drift, memory, record, model, wor
 
 @jit(allocates=False, nogil=True)
 def advance_explicit(tableau, control, memory, scratch, record, budget, equations, model, work):
-    """Advance a run by an explicit pair, at most ``budget`` attempts; returns its outcome."""
+    """Advance a run by an explicit pair by at most ``budget`` attempts, and return its outcome."""
     clock, counters, state, stages, trial = memory.clock, memory.counters, memory.state, memory.stages, scratch.trial
     n, last = state.shape[0], stages.shape[0] - 1
     while True:

@@ -1,22 +1,22 @@
-"""Time integration by name: the compiled engine's methods, and scipy's and SUNDIALS' solvers as references.
+"""Time integration by a named method: compiled methods of wrcore, and solvers of scipy and SUNDIALS as references.
 
 =====================================================  =============================================================
 ``rk45``, ``tsit5``, ``rk23``, ``rk4``                 explicit pairs of order 5(4), 5(4), 3(2), 4(3), compiled
 ``rodas5``, ``rodas4``, ``rodas4p2``, ``ros34pw2``     Rosenbrock methods of order 5(4), 4(3), 4(3), 3(2)
-``auto``                                               ``rodas5``, or ``rk4`` where that gets cheaper:
+``auto``                                               ``rodas5``, or ``rk4`` where this is cheaper:
                                                        :mod:`wrcore.integrate.choice`
 ``scipy_rk45``, ``_rk23``, ``_dop853``, ``_radau``,    scipy's solvers over the same right-hand side
 ``_bdf``, ``_lsoda``
 ``cvode``                                              SUNDIALS' BDF, if scikit-sundae is installed
 =====================================================  =============================================================
 
-Failure is a value, never an exception: the states reached so far and the last valid one are kept. A run ends as
+A failure is a status, never an exception: states up to the failure and the last valid state are kept. The status is
 
 ============  ======================================================================================================
-completed     the end of the duration was reached; a vehicle at rest there has completed its run, too
-derailed      a wheelset went too far from the track's centre
-stalled       it was given up without a fault: told to stop, ``most_steps`` tried, or `STALL_ATTEMPTS` steps in a row
-              that brought it no further than `STALL_STEP` each on average
+completed     the end of the duration was reached, also by a vehicle at rest
+derailed      the lateral distance of a wheelset from the track's centre exceeded the limit
+stalled       the run was ended without a fault: by the caller, after ``most_steps``, or after `STALL_ATTEMPTS`
+              consecutive steps shorter than `STALL_STEP` on average
 failed        a number is not finite, or the step size fell below the resolution of time
 ============  ======================================================================================================
 """
@@ -48,40 +48,41 @@ from wrcore.kernels.told import reaching
 from wrcore.wheels.contact_model import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
-"""Methods of the compiled engine."""
+"""Names of the compiled methods."""
 
 REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_bdf", "scipy_lsoda", "cvode")
-"""Methods of other libraries."""
+"""Names of the methods of other libraries."""
 
 STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-8
-"""So many steps (tried ones) in a row that are this short on average, s, are no headway: some 0.1 s of work for a
-wheelset, and at this pace a simulated second takes fifty million steps. The shortest time scale of a stiff contact is
-10 us, and explicit methods take steps of 5 us at 0.1 m/s and of 50 ns at the least speed of creepages, 1 mm/s. Steps of
-a stated length, or bounded by ``longest_step``, may be as short as they are asked to be.
+"""Number of consecutive attempts, and mean step (s) below which a run with these attempts is stalled. This is some
+0.1 s of work for a wheelset; a simulated second would take fifty million steps. The shortest time scale of a stiff
+contact is 10 µs. Explicit methods have steps of 5 µs at 0.1 m/s, and of 50 ns at the least speed of creepages, 1 mm/s.
+Fixed steps, and steps limited by ``longest_step``, may be shorter.
 """
 
 CHUNK, FIRST_CHUNK, BREATH = 2000, 16, 0.5
-"""Most attempts between two returns to Python, for progress and interrupts, how many there are at first, and how long
-(s) they may take: an attempt with exact patches takes some 10 ms."""
+"""Calls of the kernel between returns to Python, for progress and interrupts: maximum number of attempts, number in the
+first call, and target of the duration, s. An attempt with exact patches takes some 10 ms."""
 
 
 def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=0.0, step=0.0, longest_step=0.05, derailed_y=np.inf,
     progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
 ):  # fmt: skip
-    """Trajectory of a model's equations of motion at increasing output times (s), the last of which ends the run.
+    """Integrate a model's equations of motion and return its `Trajectory` at increasing output times (s).
 
-    ``start`` is the state at the first time, or the Checkpoint of an earlier run, which goes on by the same method, not
-    before its ``t``. ``method`` is one of `METHODS` or `REFERENCES`, or ``auto``. Positions may err in a step by the
-    part ``rtol`` of 1 cm and by ``atol`` (m) on top; all else follows (:mod:`wrcore.integrate.tolerances`), but the
-    references average over all components. ``step`` (s) fixes the length of all steps (0: by the tolerance),
-    ``longest_step`` (s) bounds it. A wheelset farther than ``derailed_y`` (m) from the track's centre ends the run.
+    The last output time ends the run. ``start`` is the state at the first time, or the Checkpoint of an earlier run,
+    which continues by the same method, not before its ``t``. ``method`` is one of `METHODS` or `REFERENCES`, or
+    ``auto``. The tolerance of positions in a step is ``rtol`` times 1 cm plus ``atol`` (m); other tolerances follow
+    (:mod:`wrcore.integrate.tolerances`), but reference methods average over all components. ``step`` (s) fixes the
+    length of all steps (0: step size control), ``longest_step`` (s) limits it. The run ends if a wheelset is farther
+    than ``derailed_y`` (m) from the track's centre.
 
-    Every ``chunk`` attempts, of no influence on the result, ``progress`` is called with the time reached and ``stop()``
-    asked for a reason to end the run as stalled, or an empty string. ``most_steps`` bounds the steps tried, those
-    before a checkpoint among them (references: the accepted ones; 0: no bound). ``equations``: those of this very
-    model, where they are at hand; these and ``step`` are for compiled methods only (with it ``auto`` stays by one
-    method). An InputError if the start is none of this model, or a checkpoint of a reference.
+    At most every ``chunk`` attempts, without effect on the result, ``progress`` is called with the time reached;
+    ``stop()`` then returns a reason to end the run as stalled, or an empty string. ``most_steps`` limits the attempts,
+    with those before a checkpoint (references: accepted steps; 0: no limit). ``equations`` are existing `Equations` of
+    this model; these and ``step`` are for compiled methods only (with ``step``, ``auto`` uses one method). Raises an
+    InputError if the start does not fit the model, or is a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
     start, method, looks = beginning(model, start, method, step)
@@ -94,7 +95,7 @@ def integrate(
             if may_drive(model)
             else pace(model.bodies.wheelsets, model.contact.least_speed, start, start)
         )
-        tolerances = tolerances[0] + rate * tolerances[1]  # theirs stay what they are
+        tolerances = tolerances[0] + rate * tolerances[1]  # reference integrators cannot change tolerances in a run
         return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
     run = Integration(
@@ -127,8 +128,9 @@ def integrate(
 
 
 def beginning(model, start, method, step=0.0):
-    """A checked start, the method that it goes by, and whether to look for a better one; arguments as for
-    `integrate`."""
+    """Return the checked start, the first method, and whether the run compares methods (``auto``).
+
+    Arguments are those of `integrate`."""
     start, looks = _checked(start, model), method == "auto" and step == 0.0
     if isinstance(start, Checkpoint):
         return start, start.method, looks
@@ -136,8 +138,9 @@ def beginning(model, start, method, step=0.0):
 
 
 def needed_last(model, method):
-    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method, or of both that
-    ``auto`` may go by."""
+    """Return the kernels that a run compiles last, each with its argument types.
+
+    These are the kernels of the Jacobian and of the method, or of both methods of ``auto``."""
     if method in REFERENCES:
         return []
     with planning() as kernels:
@@ -150,9 +153,10 @@ def needed_last(model, method):
 
 
 class Integration:
-    """A run by a compiled method between two calls of `advance`: ``equations``, ``memory`` and the rest of what it
-    knows; arguments as for `integrate`, with the ``tolerance`` (rtol, atol). One that ``looks`` may change its method,
-    as the one of whose checkpoint it goes on. ``compiled_s``: what that took in the way of kernels, s."""
+    """Run by a compiled method, with its complete state between two calls of `advance`.
+
+    Arguments are those of `integrate`, with the ``tolerance`` (rtol, atol). A run that ``looks`` compares methods and
+    may change its method. ``compiled_s`` is the time of compiling kernels after such a change, s."""
 
     def __init__(
         self, model, start, t, method, tolerance, step, longest_step, derailed_y, equations=None, looks=False
@@ -171,12 +175,12 @@ class Integration:
             self.go_on_from(start if looks else replace(start, notes=self.notes))
             if not np.isfinite(memory.clock[: engine.ERROR]).all():
                 raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
-            if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
+            if step and step != memory.clock[engine.NEXT]:  # restart the grid of fixed steps
                 memory.clock[engine.NEXT] = step
                 self._begin_grid()
 
     def _take(self, method):
-        """Go by a method, with a Jacobian, and stages, that nothing is known of yet."""
+        """Set the method, and allocate its stages and Jacobian."""
         stiff, self.method = method in ROSENBROCK, method
         self._tableau = ROSENBROCK[method] if stiff else EXPLICIT[method]
         stages = np.zeros((len(self._tableau.nodes), len(self.memory.state)))
@@ -188,18 +192,18 @@ class Integration:
         self._before += (self.linear, self._system) if stiff else ()
 
     def record(self, times):
-        """A `Record` for output times (n,), s."""
+        """Return an empty `Record` for output times (n,), s."""
         return Record(times, np.full((len(times), len(self.memory.state)), np.nan), np.zeros(1, np.int64))
 
     def advance(self, record, attempts):
-        """Outcome of at most so many attempts to reach the end of a record."""
+        """Advance the run by at most ``attempts`` towards the end of a record, and return the outcome."""
         if not len(self.notes):
             return self._advance(record, attempts)
         while True:
             ahead = max(int(self.notes[choice.Note.DUE]) - choice.attempts(self.memory.counters), 0)
             outcome = self._advance(record, min(attempts, ahead))
             if outcome != engine.RUNNING or attempts <= ahead:
-                return outcome  # the last step may be asked for outputs yet: it looks when it goes on
+                return outcome  # compare methods in the next call: outputs of the last step may be missing
             attempts -= ahead
             self._look(record)
 
@@ -225,7 +229,7 @@ class Integration:
         return outcome
 
     def _look(self, record):
-        """Go on by another method where that is worth it."""
+        """Compare the methods, and change the method if the other one is cheaper."""
         rtol, atol = self._tolerance
         tolerance = rtol + atol / LENGTH
         method = choice.method_after(self.notes, self.method, self.model, self.equations, self.memory, tolerance)
@@ -237,40 +241,41 @@ class Integration:
             self.compiled_s += time.perf_counter() - begun
 
     def kernel(self, record):
-        """The kernel that advances it, and the types that this takes with records of this very layout."""
+        """Return the kernel that advances the run, and its argument types with records of this layout."""
         return self._kernel, tuple(map(typeof, (*self._before, record, 0, *self.equations.arguments)))
 
     def without_dispatch(self, record):
-        """Have `advance` take records of this very layout only, without numba's search for the kernel by the arguments'
-        types, which costs five times as much as a call."""
+        """Let `advance` call the kernel without numba's dispatch by types, which costs five times as much as a call.
+
+        All later records must have this layout."""
         self._direct = True
         self._advance(record, 0)
 
     def begin_anew(self, t, state):
-        """Begin again at a time (s) and a state (size,), which may have any rate: with the length of the next step."""
+        """Restart at a time (s) and a state (size,) with any rate; the length of the next step is kept."""
         self.memory.clock[[engine.T, engine.T_OLD]] = t
         self.memory.state[:] = self.memory.old[:] = state
         self._forget()
         self._begin_grid()
 
     def _forget(self):
-        """Know nothing of the step before."""
+        """Discard rate, error, Jacobian and matrix of earlier steps."""
         clock, counters = self.memory.clock, self.memory.counters
         clock[engine.ERROR], clock[engine.MATRIX_STEP] = 1.0, 0.0
         counters[[engine.HAS_RATE, engine.RETRY, engine.SINCE_FULL]], counters[engine.AGE] = 0, -1
 
     def _begin_grid(self):
-        """Let steps of a fixed length count from the time reached."""
+        """Start the grid of fixed steps at the time reached."""
         clock, counters = self.memory.clock, self.memory.counters
         clock[engine.START] = clock[engine.T] - counters[engine.STEPS] * clock[engine.NEXT]
 
     def checkpoint(self, t):
-        """Where the run is, with the last output time (s); it changes with the run but for its places."""
+        """Return a `Checkpoint` with the last output time (s); memory and Jacobian are those of the run, not copies."""
         places = (place.copy() for place in self.places)
         return Checkpoint(self.method, float(t), self.memory, self.linear, *places, notes=self.notes.copy())
 
     def go_on_from(self, checkpoint):
-        """Take over all numbers of a checkpoint of this model."""
+        """Copy the state of a checkpoint of this model to the run."""
         if checkpoint.method != self.method:
             self._take(checkpoint.method)
         self.notes = choice.checked_notes(checkpoint)
@@ -281,7 +286,7 @@ class Integration:
             factorise_again(self._tableau, self.memory, self.linear, self._system)
 
     def ending(self, outcome, given_up=""):
-        """Status and reason of an outcome, or why the run was given up."""
+        """Return status and reason of an outcome; ``given_up`` is the reason of a stalled run."""
         if self.fault:
             return "failed", f"{self.fault} at t = {self.memory.clock[engine.T]:.6g} s"
         status, reason = _ending(outcome, given_up, self.model, self.memory, self.equations.work)
@@ -291,7 +296,7 @@ class Integration:
         return status, reason
 
     def trajectory(self, record, outcome, given_up, before, wall):
-        """`Trajectory` over a record; counters count from ``before``, ``wall`` in s."""
+        """Return the `Trajectory` of a record; ``before`` are the counters at its start, ``wall`` is in s."""
         memory, times, work = self.memory, record.times, self.equations.work
         counters, reached = memory.counters - before, int(record.reached[0])
         status, reason = self.ending(outcome, given_up)
@@ -310,7 +315,7 @@ class Integration:
 
 
 class Headway:
-    """Whether a run gets on: counts the steps that were tried, all of them and since it was last seen to get on."""
+    """Monitor of a run's progress: ends runs with too many attempts or too short steps."""
 
     def __init__(self, memory, most_steps, least_step):
         self.memory, self.least_step = memory, least_step
@@ -321,11 +326,11 @@ class Headway:
         return choice.attempts(self.memory.counters)
 
     def attempts_left(self):
-        """Before the next look is due."""
+        """Return the number of attempts up to the next check."""
         return int(max(min(self.seen + STALL_ATTEMPTS, self.most) - self.attempts(), 0))
 
     def lost(self):
-        """A reason to give up, or an empty string."""
+        """Return a reason to end the run as stalled, or an empty string."""
         t, attempts = self.memory.clock[engine.T], self.attempts()
         if attempts >= self.most:
             return f"{attempts} steps were tried, as many as integration.most_steps allows, at t = {t:.6g} s"
@@ -340,7 +345,7 @@ class Headway:
 
 
 def _checked(start, model):
-    """A start whose state fits the model and is finite."""
+    """Return the start; raise an InputError if its state does not fit the model or is not finite."""
     if isinstance(start, Checkpoint):
         _checked(start.memory.state, model)
         if start.method not in METHODS:
@@ -355,7 +360,7 @@ def _checked(start, model):
 
 
 def _take_over(fresh, kept, planned=False):
-    """Copy the numbers of a checkpoint into arrays made for the model, whose own ``planned`` indices stay."""
+    """Copy the arrays of a checkpoint to those of the model; with ``planned``, only floating-point arrays."""
     if type(fresh) is not type(kept):
         raise InputError("start", "checkpoint", f"expected a {type(fresh).__name__}, got a {type(kept).__name__}")
     for array, other in zip(fresh or (), kept or (), strict=True):
@@ -368,7 +373,7 @@ def _take_over(fresh, kept, planned=False):
 
 
 def _ending(outcome, given_up, model, memory, work):
-    """Status and reason of a compiled run's outcome, or why it was given up."""
+    """Return status and reason of a compiled run's outcome; ``given_up`` is the reason of a stalled run."""
     t = memory.clock[engine.T]
     if outcome == engine.COMPLETED:
         return "completed", ""

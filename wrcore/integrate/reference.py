@@ -1,4 +1,4 @@
-"""Independent references: scipy's solvers, and SUNDIALS' CVODE, over the same right-hand side."""
+"""Independent reference integrators: scipy's solvers and SUNDIALS' CVODE, with the right-hand side of wrcore."""
 
 import time
 from dataclasses import replace
@@ -15,16 +15,18 @@ SOLVERS = {
     "scipy_rk45": "RK45", "scipy_rk23": "RK23", "scipy_dop853": "DOP853", "scipy_radau": "Radau", "scipy_bdf": "BDF",
     "scipy_lsoda": "LSODA",
 }  # fmt: skip
-"""scipy's classes by method name."""
+"""Names of scipy's solver classes by method name."""
 
 LEAST_RTOL = 3e-14
-"""Tolerance by the size of a component, as small as scipy allows: what counts are the tolerances of each."""
+"""Tolerance relative to the size of a component, the minimum of scipy: the absolute tolerances control the error."""
 
 
 def integrate_by_reference(model, state, times, method, tolerances, longest_step, derailed_y, progress=None, halt=None,
                            most_steps=0):  # fmt: skip
-    """Trajectory of a model by a solver of another library; arguments as for `integrator.integrate`, but ``tolerances``
-    (size,) of the components. An InputError for ``cvode`` without scikit-sundae."""
+    """Integrate a model by a solver of another library and return its `Trajectory`.
+
+    Arguments are those of `integrator.integrate`, except for ``tolerances`` (size,) of the components. Raises an
+    InputError for ``cvode`` if scikit-sundae is not installed."""
     function = Equations(model)
 
     def stop(t, state):
@@ -41,13 +43,12 @@ def integrate_function(
     function, state, times, method="scipy_rk45", rtol=1e-6, atol=1e-9, longest_step=np.inf, stop=None, progress=None,
     halt=None, most_steps=0,
 ):  # fmt: skip
-    """Trajectory of any right-hand side ``function(t, state)``, which must return a new array, by a solver of another
-    library.
+    """Integrate a right-hand side ``function(t, state)`` by a solver of another library and return its `Trajectory`.
 
-    ``method`` is a key of `SOLVERS` or ``cvode``, ``rtol`` and ``atol`` (one, or one for each component) are the
-    library's tolerances. After each step ``progress`` is called with the time reached, and ``stop(t, state)`` and, with
-    scipy's solvers, ``halt()`` are asked for a reason to end the run, the latter as stalled, or an empty string.
-    ``most_steps`` bounds the accepted steps (0: no bound).
+    The function must return a new array. ``method`` is a key of `SOLVERS` or ``cvode``; ``rtol`` and ``atol`` (a
+    number, or one for each component) are the library's tolerances. After each step ``progress`` is called with the
+    time reached. ``stop(t, state)`` and, with scipy's solvers, ``halt()`` return a reason to end the run or an empty
+    string; a run ended by ``halt`` is stalled. ``most_steps`` limits the accepted steps (0: no limit).
     """
     evaluations = 0
 
@@ -62,7 +63,7 @@ def integrate_function(
     reached, states, status, reason, counts = run(
         counted, start, times, method, rtol, atol, longest_step, stop, progress, halt, most_steps
     )
-    if method in ("scipy_rk45", "scipy_rk23"):  # two evaluations to start with, as many as stages for each attempt
+    if method in ("scipy_rk45", "scipy_rk23"):  # two evaluations at the start, one per stage in each attempt
         counts["rejected"] = (evaluations - 2) // (6 if method == "scipy_rk45" else 3) - counts["steps"]
     return Trajectory(
         method, times[:reached], states[:reached], status, reason, rhs_evaluations=evaluations,
@@ -71,7 +72,7 @@ def integrate_function(
     )  # fmt: skip
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a wild trial step is rejected by its error estimate
+@np.errstate(over="ignore", invalid="ignore")  # an overflow in a trial step is rejected by its error estimate
 def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, progress, halt, most_steps):
     states = np.full((len(times), len(state)), np.nan)
     states[0] = state

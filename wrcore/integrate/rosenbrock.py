@@ -1,8 +1,8 @@
-"""Rosenbrock methods for scenes in which stiffness, not accuracy, would bound an explicit step.
+"""Rosenbrock methods, for scenes in which stiffness and not accuracy limits an explicit step.
 
-At low speed creepage damps the wheelset's motion at a rate that grows as 1/V. A Rosenbrock method solves one linear
-system per stage, all with the matrix 1/(h gamma) - J. The displacements are eliminated: they change at the rate of the
-velocities, so that what is factorised has six unknowns a body and one per force element with a state of its own.
+At low speed creepage damps the wheelset's motion at a rate proportional to 1/V. A Rosenbrock method solves one linear
+system per stage, all with the matrix 1/(h gamma) - J. Displacements are eliminated, as their rates are the velocities.
+The factorised matrix has six unknowns per body, and one per force element with an internal state.
 """
 
 from typing import NamedTuple
@@ -23,15 +23,15 @@ from wrcore.kernels.jit import jit
 from wrcore.wheels.modes import SPEEDS_GIVEN, STAGE
 
 CONTACT_REFRESHES = 20
-"""Refreshes of the contacts' part of the Jacobian between two of the whole."""
+"""Number of refreshes of the contacts' part of the Jacobian between two refreshes of the full Jacobian."""
 
 HOLD = 1.2
-"""With a Jacobian that serves several steps, a step that could grow by less than this factor stays, and with it the
-factorised matrix."""
+"""Minimum factor by which a step grows if a Jacobian serves several steps; a constant step reuses the factorised
+matrix."""
 
 
 class Linear(NamedTuple):
-    """The Jacobian of a run."""
+    """Jacobian of a run, and the plan by which it is computed."""
 
     sweep: Sweep
     joined: Joined
@@ -47,7 +47,8 @@ def new_linear(equations):
 
 @jit(allocates=False)
 def _renew(tableau, memory, scratch, linear, system, equations, model, work):
-    """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
+    """Refresh the Jacobian if it is too old, and factorise the matrix if the step has changed; False if singular.
+
     After a rejected step a Jacobian from an earlier state is refreshed first."""
     clock, counters = memory.clock, memory.counters
     age, step = counters[engine.AGE], clock[engine.NEXT]
@@ -72,8 +73,10 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
 
 @jit(allocates=False)
 def _residual_error(tableau, control, memory, scratch, linear, system, theta, there, pace_there, model):
-    """Error by the rate ``scratch.defect``, which is overwritten, of a state ``there`` that the dense output of an
-    attempt has at ``theta``, against the output's own; the system damps what is stiff."""
+    """Error norm of the residual of an attempt's dense output at ``theta``: model's rate minus the output's derivative.
+
+    ``there`` is the state of the dense output, ``scratch.defect`` its rate by the model, which is overwritten. Stiff
+    components of the residual are damped by solving with the factorised matrix."""
     step, stages, defect = memory.clock[engine.NEXT], memory.stages, scratch.defect
     bodies, turn, drift = model.bodies.mass.shape[0], turn_of(linear.jacobian), linear.jacobian.drift
     rates_of_increments(bodies, turn, drift, theta * step, memory.state, there, defect)
@@ -89,7 +92,7 @@ def _residual_error(tableau, control, memory, scratch, linear, system, theta, th
 
 @jit(allocates=False)
 def _error_between(tableau, control, memory, scratch, linear, system, pace_there, equations, model, work):
-    """Error of the dense output of an attempt where the tableau has it looked at."""
+    """Error norm of an attempt's dense output at the ``looked_at`` of the tableau, times the tableau's ``residual``."""
     theta, there, step = tableau.looked_at, scratch.between, memory.clock[engine.NEXT]
     interpolate(tableau.dense, theta, 1.0, memory.stages, there)
     carry(
@@ -104,10 +107,10 @@ def _error_between(tableau, control, memory, scratch, linear, system, pace_there
 
 @jit(allocates=False)
 def _touchdown_error(tableau, control, memory, scratch, linear, system, pace_there, model):
-    """Error by the rate at the end of an attempt (``scratch.slope``) against the dense output's there.
+    """Error norm of the residual at an attempt's end: rate (``scratch.slope``) minus the dense output's derivative.
 
-    Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
-    embedded method compares is blind to it at any tolerance, and the impact would give energy.
+    Both agree to the method's order. If a wheel touches down near the end of a step, no stage contains the contact. The
+    embedded method cannot detect this at any tolerance, and the impact would add energy.
     """
     copy_into(scratch.defect, scratch.slope)
     return _residual_error(tableau, control, memory, scratch, linear, system, 1.0, scratch.trial, pace_there, model)
@@ -115,14 +118,14 @@ def _touchdown_error(tableau, control, memory, scratch, linear, system, pace_the
 
 @jit(allocates=False)
 def factorise_again(tableau, memory, linear, system):
-    """Find what ``system`` holds anew, which no checkpoint keeps."""
+    """Factorise the matrix of ``system`` again after a checkpoint, which does not contain it."""
     if memory.clock[engine.MATRIX_STEP] > 0.0:
         factorise(linear.jacobian, system, 1.0 / (memory.clock[engine.MATRIX_STEP] * tableau.gamma))
 
 
 @jit(allocates=False, nogil=True)
 def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record, budget, equations, model, work):
-    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome."""
+    """Advance a run by a Rosenbrock method by at most ``budget`` attempts, and return its outcome."""
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
@@ -189,7 +192,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
             found = _error_between(tableau, control, memory, scratch, linear, system, rate, equations, model, work)
             error = found if not found <= error else error
         fresh, contacts = error <= 1.0, 0
-        if fresh:  # the next step's first rate
+        if fresh:  # first rate of the next step
             derivatives_at(equations, clock[engine.T] + step, trial, model, work, slope, STAGE)
             counters[engine.EVALUATIONS] += 1
             contacts = touching(work)

@@ -1,8 +1,8 @@
-"""Coefficients of the one-step methods, as data for one kernel per family.
+"""Coefficients of one-step methods, as data for one kernel per family of methods.
 
-Explicit pairs advance by ``y1 = y + h sum b_i k_i`` with ``k_i = f(t + c_i h, y + h sum a_ij k_j)``. All are stiffly
-written: the last stage is taken at the new state (its row of ``a`` is b), serves as the first one of the next step, and
-is part of the error estimate ``h sum e_i k_i``.
+Explicit pairs advance by ``y1 = y + h sum b_i k_i`` with ``k_i = f(t + c_i h, y + h sum a_ij k_j)``. In all of them the
+last stage is at the new state (its row of ``a`` is b). It is also the first stage of the next step, and part of the
+error estimate ``h sum e_i k_i``.
 
 Rosenbrock methods advance by ``y1 = y + sum m_i u_i`` with one matrix for all stages (Hairer and Wanner, IV.7):
 
@@ -27,17 +27,17 @@ import numpy as np
 
 
 class ExplicitTableau(NamedTuple):
-    """An embedded pair whose last stage is the first one of the next step."""
+    """Coefficients of an explicit embedded pair whose last stage is the first one of the next step."""
 
     nodes: np.ndarray  # (s,): c
     stages: np.ndarray  # (s, s): a, strictly lower; the last row holds the weights b
-    error: np.ndarray  # (s,): b less the embedded weights
+    error: np.ndarray  # (s,): b minus the embedded weights
     dense: np.ndarray  # (s, d): weight of stage i at theta is the sum of dense[i, k] theta^(k + 1)
-    exponent: float  # the error estimate is of this order in h
+    exponent: float  # order of the error estimate in h
 
 
 class RosenbrockTableau(NamedTuple):
-    """An embedded Rosenbrock method in the form without products of matrices and vectors."""
+    """Coefficients of an embedded Rosenbrock method, in the form without products of matrices and vectors."""
 
     nodes: np.ndarray  # (s,)
     by_time: np.ndarray  # (s,): factors d_i of h df/dt
@@ -48,15 +48,15 @@ class RosenbrockTableau(NamedTuple):
     dense: np.ndarray  # (s, d), as for explicit pairs, for weights of u_i
     exponent: float
     gamma: float
-    reuse: int  # steps for which a Jacobian serves: 1 where the order rests on an exact one
-    looked_at: float  # theta at which the dense output is held against the equations; 0 for none
-    residual: float  # what the error found there counts
-    speeds: np.ndarray  # (s + 1, s): see `implied_speeds`
-    begun: np.ndarray  # (s + 1,)
+    reuse: int  # number of steps with one Jacobian: 1 if the order requires an exact one
+    looked_at: float  # theta at which the residual of the dense output is evaluated; 0: never
+    residual: float  # factor on the error of this residual
+    speeds: np.ndarray  # (s + 1, s): D of `implied_speeds`
+    begun: np.ndarray  # (s + 1,): f of `implied_speeds`
 
 
 def _lower(*rows):
-    """Square matrix from the entries left of its diagonal, row by row from the second one."""
+    """Return a square matrix from its entries below the diagonal, row by row from the second row on."""
     matrix = np.zeros((len(rows) + 1, len(rows) + 1))
     for i, row in enumerate(rows, 1):
         matrix[i, : len(row)] = row
@@ -64,18 +64,18 @@ def _lower(*rows):
 
 
 def implied_speeds(stages, couplings, gamma, error):
-    """How the increments u of a method's stages imply those of their rates, where q' = v and v is a state, too.
+    """Return the coefficients D (s + 1, s) and f (s + 1,) of speeds v that the stage increments u of q' = v imply.
 
-    For q the stages are 1/(h gamma) u_i - w_i = v0 + a_ij w_j - d + c_ij u_j/h, where w are the increments of v, which
-    begins at v0, and d is the drift. So w = (1 + a)^-1 ((1/gamma - c) u/h - (v0 - d)), and v of stage i is
-    v0 + D_ij u_j/h + f_i (v0 - d). Returns D (s + 1, s) and f (s + 1,), last what the error of v in the step is.
+    If v is a state, too, with increments w, initial value v0 and drift d, the stages of q are
+    1/(h gamma) u_i - w_i = v0 + a_ij w_j - d + c_ij u_j/h. So w = (1 + a)^-1 ((1/gamma - c) u/h - (v0 - d)), and v of
+    stage i is v0 + D_ij u_j/h + f_i (v0 - d). The last rows of D and f are those of the error of v in the step.
     """
     inverse, mixed = np.linalg.inv(np.eye(len(stages)) + stages), np.vstack([stages, error])
     return mixed @ inverse @ (np.eye(len(stages)) / gamma - couplings), -(mixed @ inverse).sum(axis=1)
 
 
 def _hermite(weights):
-    """Dense output (s, 3): the cubic that meets both states and both slopes of a step."""
+    """Return the cubic dense output (s, 3) through the states and their derivatives at both ends of a step."""
     dense = np.outer(weights, [0.0, 3.0, -2.0])
     dense[0] += [1.0, -2.0, 1.0]
     dense[-1] += [0.0, -1.0, 1.0]
@@ -133,16 +133,20 @@ def _bogacki_shampine():
 
 
 def _classical():
-    """Kutta's fourth-order method; weighting the slope at the new state instead of k_4 is of third order."""
+    """Return the tableau of Kutta's fourth-order method.
+
+    The embedded method of third order uses the slope at the new state instead of k_4."""
     stages = _lower([1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0], [1 / 6, 1 / 3, 1 / 3, 1 / 6])
     error = np.array([0.0, 0.0, 0.0, 1 / 6, -1 / 6])
     return ExplicitTableau(np.array([0.0, 1 / 2, 1 / 2, 1.0, 1.0]), stages, error, _hermite(stages[-1]), 4.0)
 
 
 def _rodas(nodes, by_time, stages, couplings, *bends, exponent=4.0, gamma=0.25, looked_at=0.0, residual=0.0):
-    """A method of RODAS' kind: the last two stages are at the end of the step, the last one is the error's estimate.
-    Rows of ``stages`` up to the last but one; ``bends`` are the weights, for some or all stages, of its dense output:
-    theta times those of the step and (1 - theta) theta^k times the k-th."""
+    """Return the tableau of a method of the RODAS type.
+
+    The last two stages are at the end of the step; the last one is the error estimate. ``stages`` are the rows up to
+    the last but one. The weights of the dense output are theta times those of the step, plus (1 - theta) theta^k times
+    the k-th of ``bends``, which are given for some or all stages."""
     weights, size = np.array([*stages[-1], 1.0, 1.0]), len(nodes) + 2
     bent = [np.zeros(size), *(np.append(bend, np.zeros(size - len(bend))) for bend in bends), np.zeros(size)]
     dense = np.diff(bent, axis=0).T + np.outer(weights, np.arange(len(bends) + 1) == 0)
@@ -198,8 +202,10 @@ def _rodas4p2():
 
 
 def _rodas5():
-    """No node of Rodas5 lies between 0.49 and 1. What begins and is over there, a torque that is switched, a wheel that
-    locks, its stages and their estimate do not see: looked at in the middle, errors are a hundredth."""
+    """Return the tableau of Rodas5, which has no node between 0.49 and 1.
+
+    Its stages and error estimate do not detect short events between these nodes, e.g. a switched torque or a locking
+    wheel. Evaluating the residual at theta = 0.74 reduces errors to a hundredth."""
     return _rodas(
         [0.0, 0.38, 0.3878509998321533, 0.483971893787384, 0.457047700881958, 1],
         [0.19, -0.1823079225333714636, -0.319231832186874912, 0.3449828624725343, -0.377417564392089818, 0],

@@ -1,20 +1,22 @@
-"""What a step may err: one number, the same for every kind of state in what it does to the motion.
+"""Tolerated error of a step: one length, from which the tolerances of all states follow by their effect on the motion.
 
-A position may err by ``atol + rtol`` times `LENGTH` in a step, in any direction and however far down the track. All
-else follows from that. A velocity may err by `RATE` times as much; under wheels less at low speed, where it is a
-creepage: by what turns a wheelset off its course as the position's error at half the gauge does. The speed is that of
-the wheelsets in this very step. An angle may err by what moves a point at the body's radius of gyration as far, an
-angular velocity by what moves it as fast (so that their shares of the energy are alike). A step's error is that of the
-body that errs most: a train's wheelset is as accurate as one that runs alone. A body lighter than the lightest wheelset
-may err by more, so that its error has no greater energy than one of that wheelset: 1 kg that swings on a stiff bushing
-hardly moves a wheel, and shall not dictate the steps.
+The tolerance of a position in a step is ``atol + rtol`` times `LENGTH`, in all directions and at any distance along the
+track. Other tolerances follow from it:
 
-No size of any component enters. In a curve the components along resting axes go through zero in turn, and weights by
-their size would bound the step there; and the travelled distance is no measure of what springs and contacts feel.
+* A velocity: `RATE` times as much. It is smaller for wheelsets at low speed, where velocity is creepage: its error then
+  turns a wheelset off its course as the position's error at half the gauge does, at the speed in this step.
+* An angle: the same displacement at the body's radius of gyration. An angular velocity: the same velocity there, so
+  that their energies are equal.
+* A body lighter than the lightest wheelset: larger, such that the energy of its error is at most that of the wheelset.
+  1 kg on a stiff bushing hardly moves a wheel, and must not limit the steps.
+
+A step's error is the maximum over all bodies, so that a wheelset in a train is as accurate as a single wheelset. The
+size of a component has no effect. In a curve, components along fixed axes pass through zero, and weights by their size
+would limit the step there. The travelled distance is no measure for forces of springs and contacts.
 
 `LENGTH` and `RATE` were chosen by measurement, 20 scenes with each method: wheelsets, coach and metro car, 0.2 to
-80 m/s, straight and R = 300 to 3000 m, smooth and irregular. With ``rtol`` 1e-4 wheelsets err by less than 1 um where
-the motion is not unstable, and contact forces by less than 1 % in the root mean square.
+80 m/s, straight and R = 300 to 3000 m, smooth and irregular. With ``rtol`` 1e-4 wheelsets have errors below 1 µm if the
+motion is stable, and contact forces have root mean square errors below 1 %.
 """
 
 import numpy as np
@@ -26,26 +28,26 @@ from wrcore.integrate.tableaus import EXPLICIT
 from wrcore.track.flexible_track import RAILS, track_places
 
 LENGTH = 0.01
-"""Travel that ``rtol`` refers to, m: about the play of a wheelset between the flanges."""
+"""Reference length of ``rtol``, m: about the play of a wheelset between the flanges."""
 
 SHARE = {"rodas5": 12.0, "rodas4": 3.0, "rodas4p2": 1.5, "ros34pw2": 0.1, "rk4": 5.0}
-"""What a method's estimate of its error is allowed, where that is no good measure of what the run errs by: methods of
-RODAS' kind estimate the error of their embedded method and err less, Kutta's method much less; those of ROS34PW2 with
-an old Jacobian pile up."""
+"""Factor on the tolerances of a method whose error estimate differs from the error of the run. Methods of the RODAS
+type estimate the error of their embedded method; their error is smaller, and that of Kutta's method much smaller.
+Errors of ROS34PW2 with an old Jacobian accumulate."""
 
 
 PRESSED = 0.1
-"""What rails without mass may err by, over what a wheelset may, by an explicit method: at its stability bound these
-swing, and 1 um of a rail that a wheel presses is up to 2 kN."""
+"""Tolerance of rails without mass relative to that of a wheelset, for explicit methods. At the stability bound these
+rails oscillate, and 1 µm of a loaded rail means up to 2 kN."""
 
 
 def step_tolerances(model, rtol, atol=0.0, method=""):
-    """Errors (2, size) of a step that each component of the state is allowed: what it is at any speed, and per 1/s of
-    `pace`.
+    """Return the tolerated error of a step for each component of the state, shape (2, size).
 
-    ``rtol`` is the part of `LENGTH`, ``atol`` (m) comes on top; a method in `SHARE` counts with that. Units: m, 1, m/s,
-    rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s for the velocities
-    of a flexible track; its sleeper's roll counts at the rails).
+    Row 0 is independent of speed, row 1 is multiplied by `pace` (1/s). ``rtol`` is relative to `LENGTH`, ``atol`` (m)
+    is added; the sum is multiplied by the method's `SHARE`. Units of the products: m, 1, m/s, rad/s, and m for internal
+    states (rad/s for independently rotating wheels, m/s for velocities of a flexible track; its sleeper's roll is
+    measured by the displacement at the rails).
     """
     n = len(model.bodies.mass)
     weights, lever = np.ones(STATE_SIZE * n + internal_states(model)), gyration(model.bodies)[:, None]
@@ -69,10 +71,10 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
 
 def lightness(bodies):
-    """Factor (n,) on what each body may err by: equal energy for those lighter than the lightest wheelset, else 1."""
+    """Return the factor (n,) on each body's tolerances: equal energy if lighter than the lightest wheelset, else 1."""
     return np.sqrt(np.maximum(1.0, min(bodies.mass[bodies.wheelsets], default=0.0) / bodies.mass))
 
 
 def gyration(bodies):
-    """Largest radius of gyration of each body, shape (n,), m."""
+    """Return the maximum radius of gyration of each body, shape (n,), m."""
     return np.sqrt(bodies.inertia.max(axis=1) / bodies.mass)

@@ -1,4 +1,4 @@
-"""What an integration leaves behind: states at the output times, where it can be taken up again, why it ended."""
+"""Results of an integration: states at the output times, checkpoint to continue from, reason of its end."""
 
 from dataclasses import dataclass
 
@@ -10,34 +10,34 @@ from wrcore.integrate.rosenbrock import Linear
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Everything a compiled run knows: a run taken up from it goes on bit by bit as if it had not paused."""
+    """Complete state of a compiled run: a run continued from it is bitwise identical to an uninterrupted one."""
 
     method: str
     t: float
-    """Last output time written, s; the run itself is up to a step ahead."""
+    """Last output time written, s; the time of the state is up to a step later."""
     memory: Memory
     linear: Linear | None
-    """Of Rosenbrock methods."""
+    """Jacobian of Rosenbrock methods; None for explicit methods."""
     arc_lengths: np.ndarray
-    """(k,): of the wheelsets, m: where the search for the next ones starts."""
+    """(k,): arc lengths of the wheelsets, m, from which the next searches start."""
     patches: np.ndarray
     """Solutions of patches on strips, from which the next ones start (:mod:`wrcore.contact.patch.model`)."""
     notes: np.ndarray | None = None
-    """Of a run by ``auto``: what it has seen (:mod:`wrcore.integrate.choice`); of other methods none, or of no size."""
+    """Notes of a run by ``auto`` (:mod:`wrcore.integrate.choice`); None or empty for other methods."""
     model: str = ""
-    """Fingerprint of the model, where a scene's run left it (:func:`wrcore.run.checkpoints.model_fingerprint`)."""
+    """Fingerprint of the model (:func:`wrcore.run.checkpoints.model_fingerprint`), for checkpoints of a scene's run."""
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """States at the output times, and what they cost."""
+    """States at the output times, status and cost of an integration."""
 
     method: str
-    """The method used, where ``auto`` was asked for, or both."""
+    """Method used; for ``auto`` all methods used, separated by commas."""
     t: np.ndarray
     """(n,): output times reached, s."""
     states: np.ndarray
-    """(n, size)."""
+    """(n, size): states at these times."""
     status: str
     """"completed", "derailed", "stalled" or "failed"."""
     reason: str
@@ -47,29 +47,29 @@ class Trajectory:
     rhs_evaluations: int = 0
     jacobians: int = 0
     factorisations: int = 0
-    """Accepted steps, rejected attempts, right-hand sides in all (those of Jacobians, too), refreshed Jacobians and
-    factorised matrices."""
+    """Numbers of accepted steps, rejected attempts, evaluations of the right-hand side (with those for Jacobians),
+    refreshed Jacobians and factorised matrices."""
     out_of_range: int = 0
-    """Creep look-ups out of range."""
+    """Number of interpolations outside the range of the creep table."""
     smallest_step: float = np.nan
-    """Smallest accepted step, s."""
+    """Minimum accepted step, s."""
     wall_s: float = 0.0
-    """Seconds spent in the integration."""
+    """Wall-clock time of the integration, s."""
     end: Checkpoint | None = None
-    """Where a compiled run stopped."""
+    """Checkpoint at the end of a compiled run."""
     end_t: float = np.nan
     end_state: np.ndarray | None = None
-    """Time (s) and state (size,) of the last valid state: the end of a completed run, else the last step that was
-    accepted (by the references: the last output)."""
+    """Time (s) and state (size,) of the last valid state: the end of a completed run, else the last accepted step (for
+    reference integrators: the last output)."""
     collapses: int = 0
-    """Steps that were rejected three times in a row or more."""
+    """Number of steps that were rejected at least three times in succession."""
     on_grid: int = 0
-    """Patches that strips did not solve and a grid did."""
+    """Number of patches solved on a grid because strips did not converge."""
     on_fixed_strips: int = 0
-    """Patches that strips solved without finding their tips."""
+    """Number of patches solved on strips without their tips being found."""
     not_tabulated: int = 0
-    """Patches that were to be looked up and had to be solved."""
+    """Number of patches that were solved because they are outside the lookup table."""
     outside_training: int = 0
-    """Patches of the surrogate whose form was far outside the range of its training."""
+    """Number of patches of the surrogate whose shape was far outside the range of its training."""
     unbalanced: int = 0
-    """Evaluations in which rails without mass found no balance."""
+    """Number of evaluations without a solution for the speeds of rails without mass."""
