@@ -1,1 +1,1 @@
-"""Derivatives of the equations of motion, and the elimination of their blocks."""
+"""Jacobian of the equations of motion, and block elimination of its linear systems."""

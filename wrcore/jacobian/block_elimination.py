@@ -1,12 +1,12 @@
-"""The linear system of a Rosenbrock step: 1/(h gamma) - J, body by body.
+"""Linear system of a Rosenbrock step, 1/(h gamma) - J, solved by elimination of blocks, body by body.
 
-With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v; the internal states belong
-to no body. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body, and go
-first: q = (sigma - Q)^-1 (g + R v). Internal states that act on bodies alone go next, one number each. What is left has
-a block of 6 x 6 for each pair of bodies that elements or joints link. Internal states that act on one another, those of
-the track under a wheelset, stand there as bodies do, by up to six; its displacements, q' = v, go first, too. The blocks
-are eliminated in an order that creates few others (track, wheelsets, bogies, car body). All loops are written out,
-without a linear algebra library: a step is the same to the bit on every run.
+With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v; internal states belong to no
+body. Displacements follow q' = Q q + R v with one block of Q and R per body. They are eliminated first:
+q = (sigma - Q)^-1 (g + R v). Internal states that act only on bodies are eliminated next, as scalars. The remaining
+matrix has a 6 x 6 block for each pair of bodies that elements or joints link. Internal states that act on one another,
+as those of the track under a wheelset, are nodes like bodies, with up to six unknowns each; displacements of the track,
+q' = v, are eliminated first as well. The order of elimination creates few new blocks (track, wheelsets, bogies, car
+body). All loops are explicit, without a linear algebra library, so that results are bitwise identical in every run.
 """
 
 from typing import NamedTuple
@@ -27,41 +27,41 @@ from wrcore.kernels.jit import jit
 
 
 class Pattern(NamedTuple):
-    """Which blocks there are, and the order in which nodes, bodies and then internal states by up to six, are
-    eliminated. Unknowns have the numbers of the Jacobian's ``by_velocity``."""
+    """Blocks of the matrix, and the order in which nodes are eliminated. A node is a body or up to six internal states;
+    bodies have the first numbers. Unknowns are numbered as in the Jacobian's ``by_velocity``."""
 
     first: np.ndarray  # (m,) int: first unknown of each node
     width: np.ndarray  # (m,) int: number of its unknowns
-    displaced: np.ndarray  # (m,) int: first of the internal states whose rates these are, -1: none
-    order: np.ndarray  # (m,) int: nodes
+    displaced: np.ndarray  # (m,) int: first internal state that is the displacement of these velocities; < 0: none
+    order: np.ndarray  # (m,) int: nodes in the order of elimination
     place: np.ndarray
-    """(m, m) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
+    """(m, m) int: number of the block in row i and column j, also for blocks that the elimination creates; -1: none."""
     later_starts: np.ndarray  # (m + 1,) int
-    later: np.ndarray  # (p,) int: nodes linked to the k-th one of the order and eliminated later, later_starts[k] <= p
-    pairs: np.ndarray  # (q, 2) int: rows and columns of the Jacobian's own blocks
-    states: np.ndarray  # (s,) int: unknowns that act on bodies alone
+    later: np.ndarray  # (p,) int: nodes linked to the k-th node of the order and eliminated later, later_starts[k] <= p
+    pairs: np.ndarray  # (q, 2) int: rows and columns of the blocks of the Jacobian
+    states: np.ndarray  # (s,) int: internal states that act only on bodies
     state_starts: np.ndarray  # (s + 1,) int
-    state_bodies: np.ndarray  # (r,) int: bodies of the k-th one of these, state_starts[k] <= r
+    state_bodies: np.ndarray  # (r,) int: bodies of the k-th of these states, state_starts[k] <= r
 
 
 class System(NamedTuple):
-    """The factorised system."""
+    """Factorised linear system of a step, with its right-hand side."""
 
     pattern: Pattern
     inverse: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 of positions and of rotations
     carried: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 R of positions and of rotations
-    blocks: np.ndarray  # (b, 6, 6): on the diagonal the inverse, below it L, above it U
-    pivot: np.ndarray  # (s,): diagonal entries of internal states that act on bodies alone
+    blocks: np.ndarray  # (b, 6, 6): inverse blocks on the diagonal, L below it, U above it
+    pivot: np.ndarray  # (s,): diagonal entries of internal states that act only on bodies
     force: np.ndarray  # (r, 6): column of such a state in the rows of its bodies
     drive: np.ndarray  # (r, 6): row of such a state in the columns of its bodies
     right: np.ndarray  # (m, 6): right-hand side, then velocities and internal states
-    shift: np.ndarray  # (n, 6): displacements that do not depend on the velocities sought
+    shift: np.ndarray  # (n, 6): part of the displacements that is independent of the unknown velocities
     scratch: np.ndarray  # (6, 6)
 
 
 def plan_elimination(model):
-    """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
-    them."""
+    """Plan an elimination by minimum degree and return its `Pattern`. The node with the fewest remaining neighbours is
+    eliminated next, which links these neighbours."""
     n, reached, linked = len(model.bodies.mass), reached_bodies(model), internal_state_bodies(model)
     displaced = track_displacements(model)
     pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
@@ -70,7 +70,7 @@ def plan_elimination(model):
         packs: list[list[int]] = []
         for state in sorted({*states} - {*displaced.values()}):
             alike = packs and (state in displaced) == (packs[-1][0] in displaced)
-            if alike and len(packs[-1]) < 6 and state == packs[-1][-1] + 1:  # one after the other in the state vector
+            if alike and len(packs[-1]) < 6 and state == packs[-1][-1] + 1:  # consecutive in the state vector
                 packs[-1].append(state)
             else:
                 packs.append([state])
@@ -106,7 +106,7 @@ def plan_elimination(model):
 
 
 def new_system(equations):
-    """Allocate the system of a model's equations."""
+    """Plan the elimination and allocate the `System` of a model's equations."""
     pattern, n = equations.planned(plan_elimination), len(equations.arguments[1].value.bodies.mass)
     m, entries = len(pattern.order), len(pattern.state_bodies)
     return System(
@@ -118,7 +118,7 @@ def new_system(equations):
 
 @jit(allocates=False)
 def _invert_rotation(a, out):
-    """Inverse of a matrix (3, 3) by its cofactors."""
+    """Write the inverse of a matrix (3, 3), computed by cofactors, to ``out``."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         for column in range(3):
@@ -132,7 +132,7 @@ def _invert_rotation(a, out):
 
 @jit(allocates=False)
 def _invert_block(block, scratch):
-    """Replace a block by its inverse (Gauss and Jordan, pivots by rows); False if it is singular or not finite."""
+    """Replace a block by its inverse (Gauss-Jordan with row pivoting); return False if it is singular or not finite."""
     for i in range(6):
         for j in range(6):
             scratch[i, j] = block[i, j]
@@ -162,7 +162,7 @@ def _invert_block(block, scratch):
 
 @jit(allocates=False)
 def _multiply_right(block, other, scratch):
-    """block = block @ other."""
+    """Replace a block by its product with another one: block = block @ other."""
     for i in range(6):
         for j in range(6):
             scratch[i, j] = 0.0
@@ -177,7 +177,7 @@ def _multiply_right(block, other, scratch):
 
 @jit(allocates=False)
 def _subtract_product(target, left, right):
-    """target -= left @ right."""
+    """Subtract a product of blocks from another block: target -= left @ right."""
     for i in range(6):
         for k in range(6):
             factor = left[i, k]
@@ -187,7 +187,7 @@ def _subtract_product(target, left, right):
 
 @jit(allocates=False)
 def _carry(jacobian, system, sigma):
-    """Eliminate the positions, u' = v - omega x u, the lengths of p, then the rotations."""
+    """Eliminate the positions (u' = v - omega x u), the lengths of p, and then the rotations of all bodies."""
     rate, share = jacobian.turn[RATE], 1.0 / (sigma - jacobian.length[0])
     along, across = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
     for b in range(system.carried.shape[0]):
@@ -209,8 +209,8 @@ def _carry(jacobian, system, sigma):
 
 @jit(allocates=False, forceinline=True)
 def _fill(jacobian, system, first, count, j, block):
-    """Write the negative derivatives of some rows with respect to the velocities of body j, with what the displacements
-    that these bring about add."""
+    """Write the negative derivatives of some rows with respect to the velocities of body j to ``block``. They include
+    the effect of the displacements that follow from these velocities."""
     for part in range(2):
         at, carried = 6 * j + 3 * part, system.carried[j, part]
         x, y, z = jacobian.by_position[at], jacobian.by_position[at + 1], jacobian.by_position[at + 2]
@@ -223,7 +223,7 @@ def _fill(jacobian, system, first, count, j, block):
 
 @jit(allocates=False, forceinline=True)
 def _add_shift(jacobian, shift, first, count, j, to):
-    """Add what the displacements of body j that do not depend on the velocities sought bring about in some rows."""
+    """Add the effect of ``shift``, the displacements of body j independent of its velocities, to some rows."""
     for k in range(6):
         column, share = jacobian.by_position[6 * j + k], shift[j, k]
         for row in range(count):
@@ -232,7 +232,7 @@ def _add_shift(jacobian, shift, first, count, j, to):
 
 @jit(allocates=False)
 def factorise(jacobian, system, sigma):
-    """Assemble and factorise the system for sigma = 1/(h gamma); False if it is singular."""
+    """Assemble and factorise the system for sigma = 1/(h gamma); return False if it is singular."""
     pattern, blocks, bodies = system.pattern, system.blocks, system.carried.shape[0]
     _carry(jacobian, system, sigma)
     blocks[:] = 0.0
@@ -293,7 +293,7 @@ def _eliminate(pattern, blocks, scratch):
 
 @jit(allocates=False)
 def _substitute(system, unknowns):
-    """Solve for velocities and internal states, in ``system.right`` and, by their number, in ``unknowns``, in place."""
+    """Solve for velocities and internal states, in place in ``system.right`` and ``unknowns``."""
     pattern, blocks, right = system.pattern, system.blocks, system.right
     n = pattern.order.shape[0]
     for s in range(system.pivot.shape[0]):
@@ -335,8 +335,8 @@ def _substitute(system, unknowns):
 
 @jit(allocates=False)
 def solve_stage(jacobian, system, sigma, increment):
-    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place. Euler
-    parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
+    """Solve for the increment of a stage, in place: ``increment`` (size,) contains its right-hand side before. Euler
+    parameters are transformed to a rotation vector 2 E dp and a length p . dp, and back by 1/2 E^T theta + length p."""
     pattern, right, shift = system.pattern, system.right, system.shift
     n = shift.shape[0]
     unknowns = increment[(STATE_SIZE - 6) * n :]  # by their number
@@ -356,7 +356,7 @@ def solve_stage(jacobian, system, sigma, increment):
                 to[i] += inverse[0, i, k] * increment[at + k]
                 to[3 + i] += inverse[1, i, k] * turn
     for node in range(n, right.shape[0]):
-        for k in range(6):  # beyond its width, too, where a stage that was not finite may have left its marks
+        for k in range(6):  # also beyond its width: an earlier stage may have left NaN there
             right[node, k] = unknowns[pattern.first[node] + k] if k < pattern.width[node] else 0.0
             if k < pattern.width[node] and pattern.displaced[node] >= 0:
                 unknowns[pattern.displaced[node] + k] /= sigma

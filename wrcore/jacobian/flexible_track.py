@@ -1,20 +1,19 @@
-"""What a flexible track adds to the contacts' part of the Jacobian: its states' columns, and the rows of its rates.
+"""Flexible track in the contacts' part of the Jacobian: columns of its states and rows of its rates.
 
-A wheel meets its rail displaced by q and moving at q'. The wrench on it changes by these as by its own displacement and
-velocity, with the other sign, and the forces f on the rail are that wrench's, with the other sign. With masses this
-gives what q'' = f/m changes by. Without, q' follows from C q' + K q = f: with df what f changes by while q' is held,
-and F what it changes by the wheel's velocities,
+The rail under a wheel is displaced by q and moves at q'. Derivatives of the wheel's forces with respect to q and q' are
+those with respect to the wheel's displacement and velocity, with opposite sign. The forces f on the rail are opposite
+to those on the wheel. With masses, the derivatives of q'' = f/m follow directly. Without mass, q' follows from
+C q' + K q = f. With df the change of f at constant q', and F the derivative of f with respect to the wheel's velocity,
 
     (C + F) dq' = df - K dq,
 
-and all slopes of the wrench are those with q' held and what dq' makes of them.
+and derivatives of the wheel's forces are those at constant q' plus the effect of dq'.
 
-Between the beginning and the end of a step that balance need not be found. A Rosenbrock method for q' = v, 0 = f - C v
-- K q, with v a state like others, solves the same linear system. Its v of a stage is a linear function of the
-increments of q (`wrcore.integrate.tableaus.implied_speeds`), and what it wants of the stage is one step of Newton's
-method from there, with the derivatives of the step's start. That is a fourth of the work, and v is smooth: contact
-damping goes from one extreme to the other over 0.05 m/s, and a stage whose q is 1 um off is in balance at another
-0.05 m/s.
+Within a step this equation need not be solved exactly. A Rosenbrock method for q' = v, 0 = f - C v - K q, with v as a
+state, solves the same linear system. Its v in a stage is a linear function of the increments of q
+(`wrcore.integrate.tableaus.implied_speeds`). From this v, the stage needs one Newton step with the derivatives of the
+step's start. This is a fourth of the work, and v is smooth. An exact solution is not smooth: contact damping changes
+from one extreme to the other over 0.05 m/s, and in a stage an error of 1 µm in q changes the solution by 0.05 m/s.
 """
 
 import math
@@ -26,22 +25,26 @@ from wrcore.track.flexible_track import RAILS, first_state_index
 from wrcore.wheels.motion import MOTION
 
 PLACES, SPEEDS = SLOPES, SLOPES + 2
-"""Rows of slopes by a rail's displacements, and by its velocities; a pair each, lateral and vertical."""
+"""First rows of derivatives with respect to a rail's displacements and velocities; two each, lateral and vertical."""
 
 RATES = 6
-"""First of two columns of slopes: rates of a rail's velocities, or of its displacements where it has no mass."""
+"""First of two columns of derivatives: those of the rates of a rail's velocities, or of its displacements if massless.
+"""
 
 BALANCED = 1e-4
-"""What a step of Newton's method may move rails that are in balance, m/s."""
+"""Maximum Newton step of the speeds of rails that count as solved, m/s."""
 
 SHORT = 20.0
-"""Speeds of rails jump where patches do. Steps are not to grow ever shorter on that: times a step's length, what a
-speed errs by is no more than 1/20 of what a displacement may. Chosen."""
+"""Factor that limits the weight of errors of rails' speeds in short steps. The speeds jump where patches jump, which
+would make steps shorter and shorter. The speed's error times the step need not be less than 1/20 of a displacement's
+tolerance. Chosen."""
 
 
 @jit(allocates=False)
 def over_rails(model, state, rate, motions):
-    """Turn motions over rails at rest into those over the rails, displaced as in a ``state`` of that ``rate``."""
+    """Change wheels' motions relative to rails at rest into those relative to the moving rails, in place.
+
+    Displacements and velocities of the rails are those of ``state`` and its ``rate``."""
     for k in range(motions.shape[0]):
         for i in range(RAILS):
             at, motion = first_state_index(model, k) + i, motions[k, i // 2]
@@ -51,7 +54,7 @@ def over_rails(model, state, rate, motions):
 
 @jit(allocates=False, inline="always")
 def _inverse(track, wheel, slopes):
-    """(C + F)^-1 of a wheel's rail."""
+    """Return the inverse (C + F)^-1 (2, 2) for a wheel's rail without mass."""
     a, b = track.damping[2 * wheel, 2 * wheel] + slopes[SPEEDS, 1], slopes[SPEEDS + 1, 1]
     c, d = slopes[SPEEDS, 2], track.damping[2 * wheel + 1, 2 * wheel + 1] + slopes[SPEEDS + 1, 2]
     scale = 1.0 / (a * d - b * c)
@@ -60,8 +63,9 @@ def _inverse(track, wheel, slopes):
 
 @jit(allocates=False, fastmath=FUSED)
 def give_way(track, wheel, slopes):
-    """Add rows and columns of its rail to a wheel's ``slopes``; of one without mass they become those of a wheel whose
-    rail gives way."""
+    """Fill the rows and columns of its rail in a wheel's derivatives ``slopes``.
+
+    For a massless rail all derivatives are changed to those with the rail's speed in equilibrium with the forces."""
     for i in range(2):
         for column in range(RATES):
             slopes[PLACES + i, column] = -slopes[ACROSS + i, column]
@@ -86,13 +90,13 @@ def give_way(track, wheel, slopes):
 
 @jit(allocates=False, inline="always")
 def without_mass(model):
-    """Whether track is flexible and rails have no mass."""
+    """Whether the track is flexible and its rails have no mass."""
     return model.flexible_track.mass.shape[0] > 0 and model.flexible_track.mass[0] == 0.0
 
 
 @jit(allocates=False)
 def in_balance(rate, model, work):
-    """Whether the rails' speeds in the work are those in a ``rate``, or nearly so."""
+    """Whether the rails' speeds in the workspace agree with those in ``rate`` within `BALANCED`."""
     for k in range(work.flexible_track.speeds.shape[0]):
         for i in range(RAILS):
             if not abs(work.flexible_track.speeds[k, i] - rate[first_state_index(model, k) + i]) < BALANCED:
@@ -102,8 +106,9 @@ def in_balance(rate, model, work):
 
 @jit(allocates=False)
 def hold_speeds(slopes, rate, model, work):
-    """Let the work have what `SPEEDS_GIVEN` needs: of the wheels' ``slopes``, and the speeds in the ``rate`` of where
-    these are."""
+    """Store the data for the mode `SPEEDS_GIVEN` in the workspace.
+
+    These are the rails' speeds in ``rate``, and derivatives from the wheels' ``slopes`` at the same state."""
     scratch = work.flexible_track
     for k in range(slopes.shape[0]):
         for i in range(RAILS):
@@ -119,8 +124,10 @@ def hold_speeds(slopes, rate, model, work):
 
 @jit(allocates=False)
 def _implied(at, begun, weights, step, rate, drift, stages):
-    """What the increments of the ``stages`` of a step (s) imply for the speed of a rail whose place is ``at``, by a
-    method's ``begun`` and ``weights`` of them; ``rate``: where the step began."""
+    """Change of a rail's speed (m/s) in a step (s) that the increments of the ``stages`` imply.
+
+    ``at`` is the index of the rail's displacement in the state, ``rate`` the rate at the start of the step; ``begun``
+    and ``weights`` are coefficients of the method (`wrcore.integrate.tableaus.implied_speeds`)."""
     speed = begun * (rate[at] - drift[at])
     for j in range(weights.shape[0]):
         speed += weights[j] / step * stages[j, at]
@@ -129,7 +136,7 @@ def _implied(at, begun, weights, step, rate, drift, stages):
 
 @jit(allocates=False)
 def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
-    """Write the rails' speeds in a stage into the work; arguments as for `_implied`."""
+    """Write the implied speeds of all rails in a stage to the workspace; arguments are those of `_implied`."""
     for k in range(work.flexible_track.speeds.shape[0]):
         for i in range(RAILS):
             at = first_state_index(model, k) + i
@@ -139,8 +146,9 @@ def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
 
 @jit(allocates=False)
 def speeds_error(begun, weights, step, rate, drift, stages, tolerances, pace, model):
-    """Error of the rails' speeds in a step, root mean square over what a velocity is allowed; in short steps over more,
-    `SHORT`."""
+    """Error norm of the rails' speeds in a step: root mean square relative to a velocity's tolerance.
+
+    In short steps it is reduced, see `SHORT`."""
     total, wheelsets, allowed = 0.0, model.bodies.wheelsets.shape[0], pace * tolerances[0, first_state_index(model, 0)]
     for k in range(wheelsets):
         for i in range(RAILS):

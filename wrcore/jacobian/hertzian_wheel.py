@@ -1,12 +1,13 @@
-"""What the wrench on a wheel changes by its pose and velocity: its ellipses' law differentiated by hand.
+"""Derivatives of a wheel's contact force and moment with respect to its position, attitude and velocity, for ellipses.
 
-A pose moves the rows of the patches (:mod:`wrcore.contact.search.moved`, or a search); all that follows is chain rule,
-but for the slopes of Hertz's shape functions and of the creep law over its own few arguments. With x' = dx over a
-direction, and relative changes n' of N, s' of a b, l' of mu N:
+The derivatives of the patches' rows with respect to position and attitude come from
+:mod:`wrcore.contact.search.moved`, or a search. The chain rule gives all others; only derivatives of Hertz's shape
+functions and of the creep law with respect to their arguments are differences. With x' the derivative of x in one
+direction, d the penetration, and relative derivatives n' of N, s' of a b, l' of mu N:
 
-    n' = 3/2 d'/d + (ln N)_A A' + (ln N)_B B' + c_d'/c_d,   s' = d'/d + (ln ab)_A A' + (ln ab)_B B' + 2/3 c_d'/c_d,
+    n' = 3/2 d'/d + (ln N)_A A' + (ln N)_B B' + c_d'/c_d,   s' = d'/d + (ln ab)_A A' + (ln ab)_B B' + 2/3 c_d'/c_d.
 
-and the nondimensional creepages xi G a b/(mu N) change by xi' G a b/(mu N) and by s' - l' of themselves.
+The derivative of a nondimensional creepage x = xi G a b/(mu N) is xi' G a b/(mu N) + (s' - l') x.
 """
 
 import math
@@ -26,21 +27,24 @@ from wrcore.wheels.force import falling
 from wrcore.wheels.hertzian_force import normal_ellipse
 
 SLOPES = MOVES + 6
-"""These, then velocity and angular velocity: rows of slopes."""
+"""Number of rows of derivatives (slopes): those of `MOVES`, then velocity and angular velocity."""
 
 SMALL = 1e-6
-"""Difference of arguments of shape functions and creep laws, over their size; of approach speeds in m/s."""
+"""Difference of arguments of shape functions and creep laws, relative to their size; of approach speeds in m/s."""
 
 SAME = 1e-5
-"""A patch that moves farther than this on the wheel's profile over a difference of the pose is another one, m."""
+"""Maximum distance on the wheel's profile, m, between corresponding patches before and after a small move."""
 
 TABLE = LAWS["table"]
+"""Number of the creep law by table."""
 
 
 def slope_scratch(model):
-    """Scratch arrays of the slopes of all wheels: patches as found and as moved, their counts, the wheels' slopes, and
-    those of a law. To a wheel's `SLOPES` of the wrench come four rows of its rail where track is flexible and one of
-    wheels that turn independently, and two columns and one, of the rates of these."""
+    """Allocate the scratch arrays for the derivatives of all wheels.
+
+    They are: patches as found and after moves, their counts, derivatives of each wheel, derivatives of a creep law. A
+    wheel has `SLOPES` rows and 6 columns (force and moment). A flexible track adds four rows of its rail, and two
+    columns of their rates; independently rotating wheels add one of each."""
     flexible, apart = len(model.flexible_track.mass) > 0, len(model.bodies.independent) > 0
     wheelsets, size = len(model.bodies.wheelsets), (SLOPES + 4 * flexible + apart, 6 + 2 * flexible + apart)
     patches = np.zeros((1 + MOVES, wheelsets, 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
@@ -49,14 +53,16 @@ def slope_scratch(model):
 
 @jit(allocates=False)
 def differentiable(contact):
-    """Whether `patch_slopes` is all there is to a contact model: no strips, no shape numbers, no rail that leans."""
+    """Whether `patch_slopes` applies to a contact model: ellipses without shape numbers, on unchanging rails."""
     shaped = contact.law == TABLE and contact.creep.table.axes.n_psi > 1
     return is_elliptic(contact) and not (shaped or changes_along(contact.geometry))
 
 
 @jit(allocates=False, fastmath=FUSED)
 def law_slopes(law, creep, log_g, g, x, table):
-    """Fill ``table`` (5, 3): Fx, Fy, Mz by a creep law, then their slopes over ln(a/b) and the creepages ``x``."""
+    """Fill ``table`` (5, 3) with Fx, Fy, Mz of a creep law, and their derivatives by ln(a/b) and the creepages ``x``.
+
+    All are nondimensional; ``g`` is a/b and ``log_g`` its logarithm."""
     for k in range(5):
         h0, h1 = (SMALL if k == 1 else 0.0), (SMALL * (1.0 + abs(x[0])) if k == 2 else 0.0)
         h2, h3 = (SMALL * (1.0 + abs(x[1])) if k == 3 else 0.0), (SMALL * (1.0 + abs(x[2])) if k == 4 else 0.0)
@@ -71,7 +77,7 @@ def law_slopes(law, creep, log_g, g, x, table):
 
 @jit(allocates=False, fastmath=FUSED)
 def slope_of_falling(contact, friction, xi, eta, speed):
-    """What ln mu changes by, over xi dxi + eta deta + (xi^2 + eta^2) dV/V, as friction falls."""
+    """Return d(ln mu) / (xi dxi + eta deta + (xi^2 + eta^2) dV/V) for friction that falls with slip velocity."""
     slip = speed * math.sqrt(xi * xi + eta * eta)
     if contact.friction_ratio == 1.0 or slip == 0.0:
         return 0.0
@@ -80,23 +86,26 @@ def slope_of_falling(contact, friction, xi, eta, speed):
 
 
 class SlipSlope(NamedTuple):
-    """What a patch's slip changes by in one direction."""
+    """Derivatives of a patch's slip with respect to motion in one direction."""
 
     speed: float
-    """V."""
+    """Derivative of the speed V by which creepages are divided."""
     uy: float
     uz: float
-    """Velocity of the wheel's point, m/s."""
+    """Derivatives of the velocity of the wheel's material point."""
     xi: float
     eta: float
     phi: float
+    """Derivatives of creepages and spin."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def slip_slope(m, j, p, dp, angle, d_angle, slip, slow, rolling):
-    """`SlipSlope` in direction ``j`` of a patch at ``p`` from the wheelset's centre, which moves by ``dp``, with the
-    cosine and sine of its ``angle``; ``slip``: xi, eta, phi, and the point's velocity along y and z; ``slow``: 1/V, and
-    ``rolling`` what V changes by with vx."""
+    """Return the `SlipSlope` of a patch in direction ``j``.
+
+    The patch is at ``p`` (m) relative to the wheelset's centre, with derivative ``dp``; ``angle`` is (cosine, sine) of
+    its contact angle, with derivatives ``d_angle``. ``slip``: xi, eta, phi, and the material point's velocity along y
+    and z. ``slow`` is 1/V, ``rolling`` the derivative of V with respect to vx."""
     (px, py, pz), (dpx, dpy, dpz), (cosine, sine), (dcosine, dsine), (xi, eta, phi, uy, uz) = (
         p,
         dp,
@@ -118,8 +127,10 @@ def slip_slope(m, j, p, dp, angle, d_angle, slip, slow, rolling):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_wrench_slope(p, dp, angle, d_angle, force, d_force, out):
-    """Add to ``out`` (6,) what the wrench of a patch's ``force``, along x, across, normal, and its moment about the
-    normal, changes by, for what place, angle and force do; see `slip_slope`."""
+    """Add the derivatives of a patch's force and moment about the wheelset's centre to ``out`` (6,).
+
+    ``force`` contains longitudinal, lateral and normal force and the moment about the normal; ``d_force`` their
+    derivatives. Other arguments are those of `slip_slope`."""
     (px, py, pz), (dpx, dpy, dpz), (cosine, sine), (dcosine, dsine) = p, dp, angle, d_angle
     (fx, fy, normal, mz), (dfx, dfy, dn, dmz) = force, d_force
     gy, gz = fy * cosine - normal * sine, fy * sine + normal * cosine
@@ -135,8 +146,10 @@ def add_wrench_slope(p, dp, angle, d_angle, force, d_force, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def _shape_slopes(contact, penetration, A, B, approach, table):
-    """Fill ``table`` (3, 4): N, a b, ln(a/b) and a/b of a loaded ellipse, then the slopes of ln N, ln(a b) and
-    ln(a/b) over A and B."""
+    """Fill ``table`` (3, 4) with values and derivatives of a loaded ellipse.
+
+    Row 0: N, a b, ln(a/b) and a/b. Rows 1 and 2: derivatives of ln N, ln(a b) and ln(a/b) with respect to the
+    curvatures A and B."""
     for k in range(3):
         h = SMALL * (A if k == 1 else B)
         normal, a, b, ratio, log_ratio = normal_ellipse(
@@ -151,10 +164,10 @@ def _shape_slopes(contact, penetration, A, B, approach, table):
 
 @jit(allocates=False, fastmath=FUSED)
 def patch_slopes(contact, m, row, moved, patch, difference, scratch, out):
-    """Add the slopes of one patch's wrench about the wheelset's centre to ``out`` (SLOPES, 6).
+    """Add the derivatives of one patch's force and moment about the wheelset's centre to ``out`` (SLOPES, 6).
 
-    ``row`` is the patch as it was found, ``moved[1 + k, patch]`` the same after a ``difference`` of the pose (m, rad);
-    ``scratch`` (8, 4 or more).
+    ``row`` is the patch as found, ``moved[1 + k, patch]`` the patch after a ``difference`` (m, rad) in the k-th
+    direction of `MOVES`; ``scratch`` has shape (8, 4 or more).
     """
     px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
     cosine, sine, depth = row[reduction.COSINE], row[reduction.SINE], row[reduction.PENETRATION]

@@ -1,21 +1,21 @@
-"""The Jacobian of the equations of motion by finite differences, in blocks that make use of their structure.
+"""Jacobian of the equations of motion by finite differences, in blocks.
 
-Unknown are, per body, a displacement (r, and a rotation vector in track axes that turns the Euler parameters by
-``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the internal states. Only the accelerations and the rates of
-internal states need differences; how velocities change positions is known.
+Unknowns are, per body, a displacement (r, and a rotation vector in track axes that changes the Euler parameters by
+``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the internal states. Only accelerations and rates of internal
+states need differences; derivatives of the rates of positions are known analytically.
 
-A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
-bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). They keep the rails' wrenches as
-they are; what the contacts add, and bring up to date more often, is in :mod:`wrcore.jacobian.wheels`.
+The columns of a body are nonzero only in rows of bodies that elements or joints link to it. One evaluation therefore
+serves several bodies (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). Contact forces are constant
+in these evaluations. The contacts' part, which is refreshed more often, is in :mod:`wrcore.jacobian.wheels`.
 
-All bodies run along at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
-greatest error of all. Positions are therefore counted from a motion at constant velocity, the ``drift`` of when the
-Jacobian was taken, and the derivative with respect to time is the one along that drift.
+All bodies move along the track at some 20 m/s. Columns of different age, whose effects should cancel, would make this
+the largest error. Positions are therefore relative to a motion at constant velocity, the ``drift`` when the Jacobian
+was computed. The derivative with respect to time is along this drift.
 
-Most of the Jacobian is up to twenty steps old. Where it serves one step, all other unknowns are counted from their
-drift, too, their rates at the step's start: what it gets wrong then multiplies increments of second order in the step.
-With an exact Jacobian the result would be the same. With an old one Rodas5 errs by 300 um in y where boxes of 1 kg ride
-on stiff bushings, by 0.6 um so.
+Most of the Jacobian is up to twenty steps old. If the contacts' part serves only one step, all other unknowns are also
+relative to a drift, their rates at the step's start. Errors of the Jacobian then multiply increments of second order in
+the step. With an exact Jacobian the result would be the same. With an old one, and boxes of 1 kg on stiff bushings,
+Rodas5 has an error of 300 µm in y without this drift, and of 0.6 µm with it.
 """
 
 import math
@@ -56,22 +56,22 @@ from wrcore.wheels.modes import BARE, ELLIPSES, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.wheels.motion import MOTION
 
 FINE_BELOW = 0.1
-"""Where creepages are divided by a speed below this (m/s), differences of velocities shrink in proportion: friction
-saturates at creepages of some 1e-3, and a difference must not come near that."""
+"""Speed (m/s) below which differences of velocities are reduced in proportion. Friction saturates at creepages of some
+1e-3; the difference of a creepage must be far smaller."""
 
 USUAL = 0.3
-"""The same below this coefficient of friction."""
+"""Coefficient of friction below which differences of velocities are reduced in proportion, for the same reason."""
 
 SLIPS = 2.0
-"""Slower than this at the usual friction (m/s; in proportion at a lower one) friction saturates at speeds of rails that
-no stage implies as well as that."""
+"""Minimum rolling speed for implied speeds of rails, m/s, at the friction `USUAL` (in proportion at a lower one). At
+lower speed, friction saturates at rail speeds below the accuracy of the implied ones."""
 
 MOMENT = 1e-7
 """Difference of time, s."""
 
 
 class Sweep(NamedTuple):
-    """Which columns one evaluation each perturbs together, and the rows that each column reaches."""
+    """Plan of the evaluations: columns that each evaluation perturbs together, and nonzero rows of each column."""
 
     starts: np.ndarray  # (e + 1,) int: evaluation i perturbs the columns starts[i] <= k < starts[i + 1]
     columns: np.ndarray
@@ -81,7 +81,7 @@ class Sweep(NamedTuple):
 
 
 class Joined(NamedTuple):
-    """Bodies that accelerate together with each wheelset: itself and those that joints hold to it."""
+    """Bodies that accelerate together with each wheelset: the wheelset and those that joints connect to it."""
 
     starts: np.ndarray  # (k + 1,) int
     bodies: np.ndarray  # (p,) int
@@ -100,14 +100,14 @@ class Jacobian(NamedTuple):
     """(n, 3): rate of the rotation vector with respect to the length of p: the frame's angular velocity, rad/s."""
     by_time: np.ndarray  # (size,): time derivative of the rate of a state that moves with the drift
     drift: np.ndarray
-    """(size,): velocities of all bodies at the places of their positions; elsewhere the rates of the increments when
-    the Jacobian was taken, or zero where it serves several steps."""
-    axes: np.ndarray  # (n, 4, 4): rows of E(p), then p, where the Jacobian was taken
+    """(size,): velocities of all bodies at the indices of their positions; elsewhere the rates of the increments when
+    the Jacobian was computed, or zero if it serves several steps."""
+    axes: np.ndarray  # (n, 4, 4): rows of E(p), then p, of the state of the Jacobian
     turn: np.ndarray
-    """(2,): turn rate of the axes that increments are counted in (rad/s), and their turn since they were those of the
-    track (rad); see `wrcore.jacobian.moving_axes`."""
-    contact: np.ndarray  # (k, c, 6 n + r): what is in it of each wheelset's contacts
-    mobility: np.ndarray  # (k, 6, 6 n): accelerations of all bodies by a wrench on a wheelset, in the wheelset's axes
+    """(2,): turning rate of the axes of increments (rad/s), and their angle relative to the track's axes (rad); see
+    `wrcore.jacobian.moving_axes`."""
+    contact: np.ndarray  # (k, c, 6 n + r): contribution of each wheelset's contacts to the Jacobian
+    mobility: np.ndarray  # (k, 6, 6 n): accelerations of all bodies by force or moment on a wheelset, in its axes
     columns: np.ndarray
     rails: np.ndarray
     motions: np.ndarray
@@ -121,12 +121,12 @@ class Jacobian(NamedTuple):
     column_numbers: np.ndarray  # (k, c) int: see `wrcore.jacobian.wheels.contact_places`
     row_numbers: np.ndarray  # (k, r) int
     implied: np.ndarray
-    """(1,): 1 where stages go by the speeds of rails that they imply: of rails without mass that were in balance, where
-    the Jacobian serves one step and is that of the model itself, and wheels do not roll too slowly (`SLIPS`)."""
+    """(1,): 1 if stages use implied speeds of massless rails. Conditions: the rails' speeds were solved, the Jacobian
+    serves one step and is that of the model without ellipses in place of strips, and the speed exceeds `SLIPS`."""
 
 
 def _groups(reach):
-    """Groups of columns whose rows do not overlap; ``reach`` holds the rows of each column."""
+    """Return groups of columns without common rows; ``reach`` contains the set of rows of each column."""
     groups = []
     for item, rows in enumerate(reach):
         for members, taken in groups:
@@ -140,7 +140,7 @@ def _groups(reach):
 
 
 def plan_sweep(model):
-    """Plan the evaluations for the whole Jacobian."""
+    """Plan the evaluations for the full Jacobian and return the `Sweep`."""
     n, linked, reached = len(model.bodies.mass), internal_state_bodies(model), reached_bodies(model)
 
     def column(body, direction):
@@ -165,13 +165,15 @@ def plan_sweep(model):
 
 
 def joined_bodies(model):
-    """Bodies that accelerate together with each wheelset."""
+    """Return the bodies that accelerate together with each wheelset, as `Joined`."""
     joined = joined_sets(model)
     return Joined(*packed([sorted(joined[body]) for body in model.bodies.wheelsets]))
 
 
 def new_jacobian(equations):
-    """Blocks of zeros for a model's equations, which get the kernel of what patches change where these are ellipses."""
+    """Allocate the `Jacobian` of a model's equations, and set the kernel of derivatives of contact forces in the model.
+
+    The address is 0 for contact models without such a kernel."""
     _, model, work = equations.arguments
     jacobian = _empty_jacobian(model.value)
     by_hand = _slopes_by_hand(model.value.contact)
@@ -182,7 +184,7 @@ def new_jacobian(equations):
 
 
 def _slopes_by_hand(contact):
-    """Kernel of what a contact model's patches change by, None where there is none."""
+    """Return the kernel of the derivatives of a contact model's forces, or None if differences are used."""
     if differentiable.py_func(contact):
         return slopes_of_patches
     if len(contact.surrogate.median) > 0:
@@ -212,7 +214,7 @@ def _empty_jacobian(model):
 
 @jit(allocates=False)
 def _take_axes(jacobian, state, rate):
-    """Write E(p), p, and the frames' angular velocities 2 E(p) p' of all bodies, see :class:`Jacobian`."""
+    """Fill ``jacobian.axes`` with E(p) and p, and ``jacobian.spin`` with 2 E(p) p' of all bodies."""
     c, s = math.cos(0.5 * jacobian.turn[ANGLE]), math.sin(0.5 * jacobian.turn[ANGLE])
     for b in range(jacobian.axes.shape[0]):
         at, rows = STATE_SIZE * b + EULER, jacobian.axes[b]
@@ -230,7 +232,7 @@ def _take_axes(jacobian, state, rate):
 
 @jit(allocates=False)
 def _take_turning(jacobian, spins, state):
-    """Write what a rotation theta and an angular velocity w change of the rotations' rates.
+    """Fill ``jacobian.turning``: derivatives of the rotations' rates with respect to rotation and angular velocity.
 
     With p' = 1/2 Omega p (quaternions; Omega = w, or w - (w a) a for a body of revolution about a, whose frame does not
     spin) and p + 1/2 theta p in place of p: the rotation vector's rate changes by dOmega + 1/2 Omega x theta, the rate
@@ -258,7 +260,7 @@ def _take_turning(jacobian, spins, state):
 
 @jit(allocates=False)
 def _take_drift(jacobian, state):
-    """Write the velocities of all bodies as the drift of positions, see :class:`Jacobian`, and no other."""
+    """Set ``jacobian.drift`` of positions to the velocities of all bodies, and all other drifts to zero."""
     c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
     jacobian.drift[:] = 0.0
     for b in range(jacobian.axes.shape[0]):
@@ -270,7 +272,7 @@ def _take_drift(jacobian, state):
 
 @jit(allocates=False)
 def _perturb(trial, column, axes, fine):
-    """Add a difference in one unknown to increments and return it; those of velocities are multiplied by ``fine``."""
+    """Add a difference in one unknown to increments and return it; differences of velocities are scaled by ``fine``."""
     n = axes.shape[0]
     if column >= 12 * n:
         at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
@@ -290,7 +292,7 @@ def _perturb(trial, column, axes, fine):
 
 @jit(allocates=False)
 def _resolved(difference, column, bodies, turn, state, trial):
-    """The difference that a state far down the track resolved."""
+    """Return the actual difference of a position after rounding, which is large far along the track."""
     k = column % 6
     if column >= 6 * bodies or k >= 3:
         return difference
@@ -303,7 +305,7 @@ def _resolved(difference, column, bodies, turn, state, trial):
 
 @jit(allocates=False)
 def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
-    """Write one column, from the rates without and with the difference."""
+    """Write one column of the Jacobian from the rates without (``base``) and with the difference (``slope``)."""
     column = sweep.columns[k]
     for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
         row = sweep.rows[j]
@@ -319,10 +321,11 @@ def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
 def refresh_jacobian(
     sweep, joined, whole, along, jacobian, t, state, rate, trial, slope, differences, equations, model, work
 ):
-    """Refresh the whole Jacobian at a state and its ``rate``, or only what the contacts put into one that was taken
-    whole before, and the drift with the derivative along it; returns the number of evaluations. With ``along`` the
-    drift is that of the whole state, not of positions alone. ``trial`` and ``slope`` (size,) are scratch; so is
-    ``differences``, with as many places as columns are perturbed together."""
+    """Refresh the Jacobian at a state and its ``rate``, and return the number of evaluations.
+
+    If ``whole`` is false, only the contacts' part, the drift and the derivative along it are refreshed. With ``along``,
+    the drift is that of all states, otherwise of positions only. ``trial`` and ``slope`` (size,) are scratch, as is
+    ``differences`` (maximum number of columns perturbed together,)."""
     n, drift, base = jacobian.axes.shape[0], jacobian.drift, jacobian.by_time
     jacobian.turn[RATE] = turn_rate(state, model, work)
     axes = turn_of(jacobian)
@@ -334,7 +337,7 @@ def refresh_jacobian(
     strips, wheels = model.contact.strips, model.bodies.wheelsets.shape[0] > 0
     rough, repeated = strips.strips > 0 and strips.looked_up == 0.0, False
     copy_into(base, rate)
-    if rough or whole:  # of a smooth neighbour of the model
+    if rough or whole:  # rate of a smooth approximation of the model
         derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
     rates_of_increments(n, axes, drift, 0.0, state, state, base)
     _take_axes(jacobian, state, base)
@@ -345,7 +348,7 @@ def refresh_jacobian(
         mode = BARE | ELLIPSES | WRENCHES_HELD if wheels and not in_time else BARE | ELLIPSES
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
-        if in_time and wheels:  # before the base's rates turn into the derivative by time
+        if in_time and wheels:  # before ``base`` is overwritten by the time derivative
             work.strips.flags[STOOD_IN] = 0.0
             renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, base, model, work, fine)
             if not (rough or whole) and work.strips.flags[STOOD_IN] > 0.0:

@@ -1,4 +1,4 @@
-"""Which bodies and internal states a motion acts on at once: the places where a Jacobian can differ from zero."""
+"""Coupling of bodies and internal states: the structure of the Jacobian's nonzero entries."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from wrcore.track.flexible_track import RAILS, track_places
 
 
 def packed(lists):
-    """Lists of numbers one behind the other: where each starts, and all numbers."""
+    """Concatenate lists of numbers; return where each list starts (one more entry than lists), and all numbers."""
     starts = np.cumsum([0] + [len(numbers) for numbers in lists])
     return starts, np.array([number for numbers in lists for number in numbers], np.int64)
 
 
 def joined_sets(model):
-    """For each body the set of bodies joined to it, which accelerate together with it."""
+    """Return for each body the set of bodies that joints connect to it, which accelerate together with it."""
     joined = [{body} for body in range(len(model.bodies.mass))]
     for i, j in model.joints.bodies:
         if i != FRAME and j != FRAME:
@@ -28,7 +28,7 @@ def joined_sets(model):
 
 
 def reached_bodies(model):
-    """For each body the set of bodies whose accelerations depend on its motion."""
+    """Return for each body the set of bodies whose accelerations depend on its motion."""
     joined, linked = joined_sets(model), [{body} for body in range(len(model.bodies.mass))]
     for i, j in [*model.elements.pairs, *model.joints.bodies, *drive_links(model)]:
         if i != FRAME and j != FRAME:
@@ -41,7 +41,7 @@ def reached_bodies(model):
 
 
 def internal_state_bodies(model):
-    """For each internal state the set of bodies whose accelerations it enters or follows."""
+    """Return for each internal state the set of bodies that it is coupled to, by its effect or by its rate."""
     elements, joined = model.elements, joined_sets(model)
     bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
@@ -66,14 +66,15 @@ def internal_state_bodies(model):
 
 
 def _states_of(elements, k):
-    """Internal states of the k-th element along one direction."""
+    """Return the indices of the internal states of the k-th element along one direction."""
     first, own = int(elements.law[k, INNER]), elements.law[k, LAW] < 0
     return range(first, first + (int(elements.directed[k, NUMBERS]) if own else 1)) if first >= 0 else ()
 
 
 def _independently_driven_wheels(model):
-    """For each motor or brake of a single wheel whose torque depends on the motion: bodies whose motion it is, and the
-    internal state of the wheels, with the speed controller's if that is what drives."""
+    """Yield bodies and internal states coupled by each motor or brake of a single wheel with motion-dependent torque.
+
+    The states are that of the wheels, and that of the speed controller if it controls the motor."""
     independent = {int(wheelset): int(state) for wheelset, state in model.bodies.independent}
     for row in model.drive.rows:
         if row[WHEEL] and row[KIND] in (BRAKE, CONTROLLED):
@@ -83,17 +84,19 @@ def _independently_driven_wheels(model):
 
 
 def _track_groups(model):
-    """For each wheelset the list of internal states of the flexible track under it; else none."""
+    """Return for each wheelset the list of internal states of the track under it; empty for rigid track."""
     if not len(model.flexible_track.mass):
         return []
     return [[int(state) for state in row] for row in track_places(model) - STATE_SIZE * len(model.bodies.mass)]
 
 
 def contact_places(model):
-    """Numbers of the Jacobian's columns that a wheelset's contacts are part of, (k, c), and of the rates among the rows
-    (k, r), both as in `wrcore.jacobian.jacobian.Sweep`; -1: none. First its displacements and velocities; then the
-    displacements of its rails, the velocities of those with masses, and half the difference of rolling rates of wheels
-    that turn independently. Rates: of the rails' velocities, or displacements where they have no mass, and of that."""
+    """Return the Jacobian's columns (k, c) and rows of rates (k, r) that contain contact forces of each wheelset.
+
+    Numbers are those of `wrcore.jacobian.jacobian.Sweep`; negative: none. Columns are the wheelset's displacements and
+    velocities, then displacements of its rails, their velocities if they have mass, and half the difference of rolling
+    rates of independently rotating wheels. Rows are the rates of the rails' velocities (of displacements for massless
+    rails), and of this difference."""
     n, wheelsets, apart = len(model.bodies.mass), model.bodies.wheelsets, dict(model.bodies.independent.tolist())
     groups, freedoms, columns, rows = _track_groups(model), len(model.flexible_track.mass), [], []
     for k, body in enumerate(wheelsets):
@@ -108,13 +111,13 @@ def contact_places(model):
 
 
 def track_displacements(model):
-    """For each internal state that is a velocity of the track the one that is its displacement."""
+    """Return a dictionary from each internal state that is a velocity of the track to that of its displacement."""
     freedoms = len(model.flexible_track.mass)
     return {v: q for states in _track_groups(model) for q, v in zip(states, states[freedoms:], strict=False)}
 
 
 def internal_state_groups(model):
-    """Lists of internal states that act on one another: those of a flexible track, of own laws, of control."""
+    """Return lists of internal states that act on one another: of flexible track, of user's laws, of control laws."""
     groups = _track_groups(model)
     for wheelset, state in model.bodies.independent if groups else ():
         groups[wheelset].append(int(state))

@@ -1,20 +1,20 @@
-"""Rotating axes, which turn with a vehicle in a curve, for methods that keep a Jacobian for more than a moment.
+"""Rotating axes that turn with a vehicle in a curve, for methods that use a Jacobian for several steps.
 
-In a curve all forces turn with the vehicle. In resting axes the Jacobian of what is stiff is wrong after a turn of
-1 mrad, and a method that holds on to it must follow that turn with short steps although nothing moves in the vehicle.
-Increments of a step are therefore counted in axes that rotate about the vertical at the constant rate omega, from a
-motion in which each body goes round a circle with its own velocity, the ``drift`` d, and all else changes at a
-constant rate in these axes, its own drift. With Q(t) the turn since the
-Jacobian was taken, the state at a time t after the step's start (subscript 0) is
+In a curve all forces turn with the vehicle. In fixed axes the Jacobian of stiff elements is wrong after a turn of
+1 mrad. A method that keeps it must then follow the turn with short steps, although the vehicle's internal motion is
+steady. Increments of a step are therefore expressed in axes that rotate about the vertical at the constant rate omega.
+They are relative to a motion in which each body moves on a circle with its velocity, the ``drift`` d, and all other
+states change at a constant rate in these axes, their drift. With Q(t) the rotation since the Jacobian was computed, the
+state at a time t after the step's start (subscript 0) is
 
     r = r0 + D(t) d + Q u,   p = q(t) p0 + q (t d_p + u_p),   v = Q(t)/Q(0) v0 + Q (t d_v + u_v),   w likewise,
 
-where D is the integral of Q, q the turn of Euler parameters, and u are increments:
+where D is the integral of Q, q the rotation of Euler parameters, and u are increments:
 
     u' = Q^T v - d - omega x u,   u_p' = q^T (p' - omega p / 2) - d_p,   u_v' = Q^T (v' - omega x v) - d_v.
 
-This is exact for any omega: the order of a method does not rest on it. In steady curving u stays zero, and a step costs
-what it costs on straight track, where omega is zero.
+This is exact for any omega, so the order of a method does not depend on it. In steady curving u remains zero, and a
+step costs as much as on straight track, where omega is zero.
 """
 
 import math
@@ -23,28 +23,29 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.kernels.jit import jit
 
 RATE, ANGLE = range(2)
-"""Places in ``turn``: turn rate (rad/s), turn since the Jacobian was taken (rad)."""
+"""Indices in ``turn``: turning rate (rad/s), angle since the Jacobian was computed (rad)."""
 
 
 @jit(allocates=False, inline="always")
 def turn_of(jacobian):
-    """Turn rate and angle of a Jacobian's axes."""
+    """Return turning rate (rad/s) and angle (rad) of a Jacobian's axes."""
     return jacobian.turn[RATE], jacobian.turn[ANGLE]
 
 
 @jit(allocates=False, inline="always")
 def _turned(c, s, x, y):
-    """A pair of components, turned by the angle of a cosine and a sine."""
+    """Return two components rotated by the angle with cosine ``c`` and sine ``s``."""
     return c * x - s * y, s * x + c * y
 
 
 VECTORS, EULER_PAIRS = ((7, 8), (10, 11)), ((3, 6), (4, 5))
-"""Components of a body's state that a turn about the vertical mixes: as a vector, and with half the angle."""
+"""Pairs of components of a body's state that a rotation about the vertical mixes: of vectors, and, with half the angle,
+of Euler parameters."""
 
 
 @jit(allocates=False, inline="always")
 def _circle(turn, t):
-    """Cosine and sine parts of D, the way along a circle that starts with a velocity of 1 m/s."""
+    """Return the cosine and sine parts of D (s), the displacement on a circle per initial velocity."""
     half = 0.5 * turn[RATE] * t
     length = t if half == 0.0 else t * math.sin(half) / half
     return length * math.cos(turn[ANGLE] + half), length * math.sin(turn[ANGLE] + half)
@@ -52,8 +53,9 @@ def _circle(turn, t):
 
 @jit(allocates=False)
 def carry(bodies, turn, drift, t, start, trial):
-    """Turn increments in ``trial`` (size,) into the state that they lead to, t (s) after the step's ``start``. ``turn``
-    is rate and angle at the step's start."""
+    """Compute the state from its increments, in place in ``trial`` (size,), at a time t (s) after the step's ``start``.
+
+    ``turn`` contains rate and angle of the axes at the step's start."""
     turned, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
     c0, s0, c, s = math.cos(turned), math.sin(turned), math.cos(whole), math.sin(whole)
     hc0, hs0, hc, hs = math.cos(0.5 * turned), math.sin(0.5 * turned), math.cos(0.5 * whole), math.sin(0.5 * whole)
@@ -79,7 +81,7 @@ def carry(bodies, turn, drift, t, start, trial):
 
 @jit(allocates=False)
 def rates_of_increments(bodies, turn, drift, t, start, trial, slope):
-    """Turn the rate of a state (``slope``, overwritten) into that of the increments; all else as for `carry`."""
+    """Compute the rate of the increments from that of the state, in place in ``slope``; arguments as for `carry`."""
     rate, whole = turn[RATE], turn[ANGLE] + turn[RATE] * t
     c, s, hc, hs = math.cos(whole), math.sin(whole), math.cos(0.5 * whole), math.sin(0.5 * whole)
     dc, ds = _circle(turn, t)

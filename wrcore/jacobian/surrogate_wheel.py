@@ -1,11 +1,11 @@
-"""Slopes of the wrench by the surrogate over position and velocity of a wheel.
+"""Derivatives of a wheel's force and moment by the surrogate, with respect to its position, attitude and velocity.
 
-A pose moves the overlap, and with it all numbers of a patch (`Pressed`) and the network's outputs. A velocity changes
-them only as the damping lifts the wheel by more or less. These numbers are therefore found six times: as they are,
-after each move of the pose, and with the wheel lifted. Slip and creep forces follow from the numbers and the motion,
-and are found once for each direction. All is in double precision, so that plain differences are accurate.
+Position and attitude move the overlap, and so change all numbers of a patch (`Pressed`) and the network's outputs. A
+velocity changes them only by the lift due to damping. These numbers are therefore evaluated six times: unchanged, after
+each move, and with the wheel lifted. Slip and creep forces follow from these numbers and the motion, and are evaluated
+once for each direction. All numbers are in double precision, so that plain differences are accurate.
 
-Wheels with patches that press each other are left to differences of the whole wrench.
+For wheels with several interacting patches, the derivatives are differences of the whole force and moment.
 """
 
 from wrcore.bodies.vector import copy_into
@@ -35,18 +35,21 @@ from wrcore.wheels.surrogate_force import (
 )
 
 DIFFERENCE, RATE_DIFFERENCE = 1e-9, 1e-8
-"""Differences of moves (m, rad) and of the lift (m), and those of velocities (m/s, rad/s) over the rolling speed
+"""Difference of moves (m, rad) and of the lift (m); difference of velocities (m/s, rad/s) relative to the rolling speed
 (m/s)."""
 
 _LIFTED = 1 + MOVES
-"""Row of a lifted wheel among the numbers of a patch, after those as it is and after each move."""
+"""Row of the lifted wheel among the numbers of a patch, after the rows of the unchanged and of the moved wheel."""
 
 _FIELDS = len(Pressed._fields)
+"""Number of columns of `Pressed`."""
 
 
 @jit(allocates=False)
 def slopes_of_surrogate(jacobian, model, work):
-    """Fill ``jacobian.slopes`` of all wheels; ``jacobian.counts`` are `UNCOUNTED` where patches press each other."""
+    """Fill ``jacobian.slopes`` with the derivatives of all wheels by the surrogate.
+
+    ``jacobian.counts`` is `UNCOUNTED` for wheels with interacting patches, or if a small move changes the overlaps."""
     for k in range(jacobian.motions.shape[0]):
         for wheel in range(2):
             contact, slopes = contact_of(model.contact, k, wheel), jacobian.slopes[k, wheel]
@@ -66,8 +69,9 @@ def slopes_of_surrogate(jacobian, model, work):
 
 @jit(allocates=False)
 def _search(contact, base, moved, found):
-    """Number of overlaps of a wheel, and whether detection was spatial: fills ``found[0]`` with their rows, and
-    ``found[1 + k]`` with those after each move. The number is -1 where a move makes others of them."""
+    """Fill ``found[0]`` with the overlaps of a wheel, and ``found[1 + k]`` with those after each move.
+
+    Returns the number of overlaps, -1 if a move changes them, and whether detection was spatial."""
     count, _, is_spatial = detect_patches(contact, left_ahead(motion_of(base)), found[0])
     for k in range(MOVES):
         move_along(base, direction_of(k), DIFFERENCE, moved)
@@ -81,9 +85,10 @@ def _search(contact, base, moved, found):
 
 @jit(allocates=False, fastmath=FUSED)
 def _wheel_slopes(contact, base, moved, found, slopes, wrenches, work):
-    """Add the slopes of one wheel to ``slopes``; returns the number of its overlaps, -1 where patches press each other
-    or a move makes others of them. ``base``: its motion; ``moved`` (the same shape), ``found`` (1 + MOVES, MAX_PATCHES,
-    PATCH_COLUMNS) and ``wrenches`` (2, 6) are scratch."""
+    """Add the derivatives of one wheel to ``slopes`` and return the number of its overlaps.
+
+    The number is -1 if patches interact or a move changes the overlaps. ``base`` is the motion; ``moved`` (same shape),
+    ``found`` (1 + MOVES, MAX_PATCHES, PATCH_COLUMNS) and ``wrenches`` (2, 6) are scratch."""
     seen = motion_of(base)
     m, first = left_ahead(seen), 0
     count, is_spatial = _search(contact, base, moved, found)
@@ -105,9 +110,10 @@ def _wheel_slopes(contact, base, moved, found, slopes, wrenches, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
-    """Fill ``work.surrogate.numbers`` (in each row `_FIELDS`, then outputs of the network) of the only patch of a group
-    of overlaps, and return what it has pressed (`wrcore.contact.search.approach.Pressed`); nothing if the wheel hangs
-    in the air."""
+    """Fill ``work.surrogate.numbers`` of the only patch of a group of overlaps, and return the group's moments.
+
+    Each row contains the `_FIELDS` of the patch, then the network's outputs. The moments are a
+    `wrcore.contact.search.approach.Pressed`, with zeros if the wheel has no contact."""
     surrogate, geometry, lean, row = work.surrogate, contact.geometry, (1.0, 0.0), work.rows[0]
     unmoved = NOTHING_PRESSED
     for n in range(2 + MOVES):
@@ -138,8 +144,9 @@ def _find_numbers(contact, base, moved, is_spatial, found, first, last, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_slopes(contact, base, moved, pressed, rows, first, last, slopes, wrenches, work):
-    """Add the slopes of the patch that `_find_numbers` found and for which it returned ``pressed``; other arguments as
-    there and in `_wheel_slopes`."""
+    """Add the derivatives of the patch whose numbers `_find_numbers` has filled to ``slopes``.
+
+    ``pressed`` is the result of `_find_numbers`; other arguments are those of it and of `_wheel_slopes`."""
     geometry, numbers, lean = contact.geometry, work.surrogate.numbers, (1.0, 0.0)
     now, lifted, mixed = numbers[0], numbers[_LIFTED], numbers[_LIFTED + 1]
     speed, share = max(abs(motion_of(base).vx), contact.least_speed), 0.0

@@ -1,13 +1,13 @@
-"""What the contacts add to the Jacobian: what the rails' wrenches change by the wheels' poses and velocities.
+"""Contacts' part of the Jacobian: derivatives of contact forces with respect to the wheels' positions and velocities.
 
-Of all parts of the Jacobian those of the contacts change fastest. Between two Jacobians in full they are brought up to
-date without an evaluation of the whole vehicle: for each wheelset the wrench's derivatives C by its pose and velocity
-are found in the rails' own frames, and to the accelerations of the wheelset and of bodies joined to it they add A C,
-where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along the rail and a
-turn about the axle change nothing. Where patches are ellipses or lobes that are looked up, C is found by hand
-(`patch_slopes`, :mod:`wrcore.jacobian.table_wheel`), of patches that moments move (:mod:`wrcore.contact.search.moved`);
-elsewhere by differences: of the search alone, or of the wrenches. The states of a flexible track
-(:mod:`wrcore.jacobian.flexible_track`) and of wheels that turn independently add columns and rows.
+The contacts' part changes faster than all others. Between two full Jacobians it is refreshed without evaluations of the
+whole vehicle. For each wheelset, the derivatives C of force and moment with respect to its position, attitude and
+velocity are computed in the rails' frames. They add A C to the accelerations of the wheelset and of bodies joined to
+it, where A are the accelerations per force and moment on the wheelset. In the rail's frame, derivatives with respect to
+the displacement along the rail and the rotation about the axle are zero. For ellipses, table patches and the surrogate,
+C is computed by the chain rule (`patch_slopes`, :mod:`wrcore.jacobian.table_wheel`), with patches moved by moments
+(:mod:`wrcore.contact.search.moved`); otherwise by differences of the search, or of forces. States of a flexible track
+(:mod:`wrcore.jacobian.flexible_track`) and of independently rotating wheels add columns and rows.
 """
 
 import math
@@ -30,30 +30,31 @@ from wrcore.wheels.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_ONLY
 from wrcore.wheels.motion import MOTION, motion_of
 
 DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
-"""Differences: m, rad, m/s and rad/s."""
+"""Differences of displacement (m), rotation (rad), velocity (m/s) and angular velocity (rad/s)."""
 
 DIRECTIONS = 12
 ALONG, ACROSS, UP, ROLL, PITCH, YAW = range(6)
-"""Columns of a body: displacement, rotation, velocity, angular velocity; and some of them."""
+"""Number of columns of a body (displacement, rotation, velocity, angular velocity), and indices of the first six."""
 
 MOVING = ACROSS, UP, ROLL, YAW
-"""Those that move patches."""
+"""Directions in which patches move."""
 
 OF_ROLL, OF_YAW, SPINS = 2, 3, MOVES + 3
-"""Rows of slopes by roll and yaw, and first of three by angular velocities."""
+"""Rows of derivatives with respect to roll and yaw, and first of three rows with respect to angular velocities."""
 
 UNIT = 1e3
-"""Wrench whose accelerations are looked at, N and N m."""
+"""Force (N) and moment (N m) for which accelerations are computed."""
 
 UNCOUNTED = -1
-"""Count of patches whose slopes have not been found."""
+"""Count of patches of a wheel whose derivatives have not been computed."""
 
 
 @jit(allocates=False)
 def take_mobility(jacobian, t, state, model, work):
-    """Write the accelerations of all bodies by a wrench on each wheelset, at the rotations in ``work``, into
-    ``jacobian.mobility``; the wrenches in ``work`` are overwritten. All in the wheelset's own axes, which do not spin:
-    in these they hardly change."""
+    """Fill ``jacobian.mobility`` with the accelerations of all bodies per force and moment on each wheelset.
+
+    They are at the rotations in ``work``, whose forces and moments are overwritten. They are in the wheelset's axes,
+    which do not spin, and in which they hardly change."""
     wheelsets, idle, bodies = model.bodies.wheelsets, jacobian.idle, model.bodies.mass.shape[0]
     _accelerations(t, state, model, work, -1, 0, idle)
     for k in range(wheelsets.shape[0]):
@@ -71,7 +72,7 @@ def take_mobility(jacobian, t, state, model, work):
 
 @jit(allocates=False)
 def _accelerations(t, state, model, work, body, direction, out):
-    """Accelerations (6 n,) by one wrench on one body, along its axes, and no other force; ``body`` < 0: none."""
+    """Fill ``out`` (6 n,) with accelerations by one force or moment along an axis of a body (``body`` < 0: none)."""
     bodies, wrenches, axes = model.bodies, work.wrenches, inertia_axes(model.bodies, work)
     wrenches[:] = 0.0
     if body >= 0:
@@ -87,13 +88,13 @@ def _accelerations(t, state, model, work, body, direction, out):
 
 @jit(allocates=False, inline="always")
 def direction_of(slope):
-    """Direction of a row of slopes."""
+    """Return the direction (column of a body) of a row of derivatives."""
     return MOVING[slope] if slope < MOVES else slope + 2
 
 
 @jit(allocates=False, fastmath=FUSED)
 def move_along(base, direction, difference, row):
-    """Write a wheel's motion with a difference in one direction of its rail's frame into ``row``."""
+    """Write a wheel's motion ``base`` plus a difference in one direction of its rail's frame to ``row``."""
     m = motion_of(base)
     copy_into(row, base)
     if direction == ROLL:
@@ -106,7 +107,7 @@ def move_along(base, direction, difference, row):
 
 @jit(allocates=False, inline="always")
 def _difference(slope, fine):
-    """Difference of a row of slopes, those of velocities multiplied by ``fine``."""
+    """Return the difference for a row of derivatives; differences of velocities are multiplied by ``fine``."""
     direction = direction_of(slope)
     if direction >= 6:
         return fine * (SPEED if direction < 9 else SPIN)
@@ -115,7 +116,7 @@ def _difference(slope, fine):
 
 @jit(allocates=False)
 def _move_all(base, slope, difference, work):
-    """Write all wheels' motions, with a difference in the direction of a row of slopes, into the work."""
+    """Write all wheels' motions plus a difference in the direction of a row of derivatives to the workspace."""
     for k in range(base.shape[0]):
         for wheel in range(2):
             move_along(base[k, wheel], direction_of(slope), difference, work.motions[k, wheel])
@@ -123,8 +124,9 @@ def _move_all(base, slope, difference, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_share(rail, wheel, slope, share, column):
-    """Add a share of a derivative of a wrench in a rail's frame (axes: columns of ``rail``), and of rates, to a
-    column."""
+    """Add ``share`` times a derivative of force, moment and rates in a rail's frame to a column.
+
+    The axes of the frame are the columns of ``rail``."""
     for j in range(3):
         column[j] += share * (rail[j, 0] * slope[0] + rail[j, 1] * slope[1] + rail[j, 2] * slope[2])
         column[3 + j] += share * (rail[j, 0] * slope[3] + rail[j, 1] * slope[4] + rail[j, 2] * slope[5])
@@ -137,7 +139,7 @@ def _add_share(rail, wheel, slope, share, column):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_column(rail, wheel, direction, slope, scale, columns):
-    """Add ``scale`` times a derivative in a direction of a rail's frame."""
+    """Add ``scale`` times the derivative with respect to a direction of a rail's frame to a wheelset's columns."""
     i, first = direction % 3, direction - direction % 3
     for axis in range(3):
         if rail[axis, i] != 0.0:
@@ -146,8 +148,10 @@ def _add_column(rail, wheel, direction, slope, scale, columns):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_rate_difference(m, half, inertia, slopes):
-    """Add the row by half the difference of the rolling rates (rad/s) to a wheel's ``slopes``, and the column of its
-    rate. The wheel turns by it about an axle that moves."""
+    """Fill the row and column of half the difference of the rolling rates in a wheel's derivatives ``slopes``.
+
+    The row is the derivative with respect to this difference (rad/s), the column is that of its rate. Roll and yaw turn
+    the axle about which the wheel rotates, which changes their rows."""
     row, column, apart = slopes.shape[0] - 1, slopes.shape[1] - 1, m.side * half
     for i in range(column):
         wx, wy, wz = slopes[SPINS, i], slopes[SPINS + 1, i], slopes[SPINS + 2, i]
@@ -160,8 +164,9 @@ def _add_rate_difference(m, half, inertia, slopes):
 
 @jit(allocates=False, fastmath=FUSED)
 def add_slopes(jacobian, state, model, columns):
-    """Add the slopes of all wheels at a ``state`` to the ``columns`` of their wheelsets; a turn about the axle changes
-    nothing."""
+    """Add the derivatives of all wheels at a ``state`` to the ``columns`` of their wheelsets.
+
+    The derivative with respect to a rotation about the axle is zero, which determines the columns of PITCH."""
     for k in range(columns.shape[0]):
         for wheel in range(2):
             rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
@@ -184,7 +189,7 @@ def add_slopes(jacobian, state, model, columns):
 
 @jit(allocates=False)
 def _take_rails(jacobian, angle, work):
-    """Write the axes of all rails' frames in the axes in which increments are counted."""
+    """Fill ``jacobian.rails`` with the axes of all rails' frames, in the axes of increments."""
     c, s = math.cos(angle), math.sin(angle)
     for k in range(jacobian.rails.shape[0]):
         for wheel in range(2):
@@ -196,10 +201,11 @@ def _take_rails(jacobian, angle, work):
 
 @jit(allocates=False)
 def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
-    """Fill ``columns`` (k, c, 6 + r) with the derivatives of the rails' force and moment, and of some rates, by
-    displacement, rotation, velocity and angular velocity of their wheelsets, and by some internal states, see
-    `wrcore.jacobian.links.contact_places`, in axes turned by an ``angle`` (rad), at a ``state`` of a ``rate``.
-    Differences of velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
+    """Fill ``columns`` (k, c, 6 + r) with derivatives of the rails' forces and moments on wheelsets, and of rates.
+
+    They are with respect to displacement, rotation, velocity and angular velocity of the wheelset and to internal
+    states, see `wrcore.jacobian.links.contact_places`. Axes are turned by an ``angle`` (rad). Differences of velocities
+    are multiplied by ``fine``; wheels and patches in ``work`` are overwritten."""
     wheelsets, base = model.bodies.wheelsets, jacobian.motions
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
@@ -228,8 +234,9 @@ def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
 
 @jit(allocates=False)
 def slopes_of_patches(jacobian, model, work):
-    """Fill ``jacobian.slopes`` with those of ellipses; ``jacobian.counts`` are `UNCOUNTED` where these are not
-    enough."""
+    """Fill ``jacobian.slopes`` with the derivatives of all wheels for elliptic patches.
+
+    ``jacobian.counts`` are `UNCOUNTED` if a difference changes the set of patches."""
     base, difference = jacobian.motions, _move_patches(jacobian, model, work)
     if difference == 0.0:
         jacobian.counts[:] = UNCOUNTED
@@ -247,8 +254,9 @@ def slopes_of_patches(jacobian, model, work):
 
 @jit(allocates=False)
 def _move_patches(jacobian, model, work):
-    """Fill ``jacobian.patches`` with all patches as they are and after differences of the pose; returns the difference
-    (m, rad), 0 where it makes others of them."""
+    """Fill ``jacobian.patches`` with all patches, unchanged and after differences of position and attitude.
+
+    Returns the difference (m, rad), or 0 if it changes the set of patches."""
     base, found = jacobian.motions, jacobian.patches
     press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
     known = model.contact.reduction == reduction.MOMENT and model.contact.detection == SPATIAL
@@ -268,7 +276,7 @@ def _move_patches(jacobian, model, work):
 
 @jit(allocates=False)
 def _search_moved(jacobian, model, work):
-    """The same by searches; False where a difference makes other patches."""
+    """Fill ``jacobian.patches`` after differences by searches; return False if one changes the set of patches."""
     base, found = jacobian.motions, jacobian.patches
     for move in range(MOVES):
         _move_all(base, move, DISPLACEMENT, work)
@@ -287,7 +295,7 @@ def _search_moved(jacobian, model, work):
 
 @jit(allocates=False)
 def _difference_wrenches(jacobian, model, work, fine):
-    """Fill ``jacobian.slopes`` by differences of the wrenches, of the wheels that are `UNCOUNTED`."""
+    """Fill ``jacobian.slopes`` of the wheels that are `UNCOUNTED` by differences of forces and moments."""
     base, found = jacobian.motions, jacobian.wrenches
     _move_all(base, 0, 0.0, work)
     press_wheels(model, work, BARE | ELLIPSES)
@@ -295,7 +303,7 @@ def _difference_wrenches(jacobian, model, work, fine):
         for wheel in range(2):
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     for step in range(SLOPES):
-        j = (step + MOVES) % SLOPES  # velocities first: the patches are those of the pose
+        j = (step + MOVES) % SLOPES  # velocities first: they keep the patches of ``base``
         difference = _difference(j, fine)
         _move_all(base, j, difference, work)
         press_wheels(model, work, BARE | ELLIPSES if j < MOVES else BARE | ELLIPSES | PATCHES_HELD)
@@ -310,7 +318,7 @@ def _difference_wrenches(jacobian, model, work, fine):
 
 @jit(allocates=False)
 def _difference_check_rails(jacobian, state, model, work, fine):
-    """Add to ``jacobian.slopes`` what check rails change by, by differences of their own forces."""
+    """Add the derivatives of the forces of check rails, by differences, to ``jacobian.slopes``."""
     for j in range(-1, SLOPES):
         difference = 0.0 if j < 0 else _difference(j, fine)
         _move_all(jacobian.motions, max(j, 0), difference, work)
@@ -327,7 +335,10 @@ def _difference_check_rails(jacobian, state, model, work, fine):
 
 @jit(allocates=False, fastmath=FUSED)
 def _respond(mobility, axes, c, s, wrench, body, out):
-    """Accelerations of one body by a wrench on a wheelset; its axes are in track axes, all else in axes turned."""
+    """Fill ``out`` (6,) with the accelerations of one body by force and moment ``wrench`` on a wheelset.
+
+    The wheelset's ``axes`` are in track axes; ``wrench`` and ``out`` are in axes turned by the angle of ``c`` and
+    ``s``."""
     for i in range(6):
         out[i] = 0.0
     for m in range(6):
@@ -346,9 +357,10 @@ def _respond(mobility, axes, c, s, wrench, body, out):
 
 @jit(allocates=False)
 def renew_contacts(joined, whole, jacobian, angle, t, state, rate, model, work, fine):
-    """Replace the contacts' part of the Jacobian, or add it where the ``whole`` has just been taken at the wrenches of
-    the rails. ``joined``: bodies that accelerate with each wheelset; ``angle``: of the axes in which increments are
-    counted, rad; ``rate``: of the state."""
+    """Replace the contacts' part of the Jacobian, or add it to a new full Jacobian (``whole``) without contacts.
+
+    ``joined``: bodies that accelerate with each wheelset; ``angle``: that of the axes of increments, rad; ``rate``:
+    rate of the state."""
     columns, out, bodies = jacobian.columns, jacobian.idle, model.bodies.mass.shape[0]
     contact_blocks(jacobian, angle, state, rate, model, work, fine, columns)
     if whole:
