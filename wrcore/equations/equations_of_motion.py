@@ -3,9 +3,9 @@
     [ M  D^T ] [ v'     ]   [ g                               ]
     [ D   0  ] [ lambda ] = [ gamma - 2 alpha Phi' - beta^2 Phi ]
 
-with v = (r', w) per body in track axes. M is block diagonal (mass, inertia in track axes), so the multipliers follow
-from the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, where gamma* is the second right-hand side. The full
-matrix of Eq. (8) is never formed. Multipliers are computed only for scenes with joints.
+with v = (r', w) per body in track axes. M is block diagonal (mass, inertia in track axes). The multipliers follow from
+the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, where gamma* is the second right-hand side. The full matrix of
+Eq. (8) is never formed. Multipliers are computed only for scenes with joints.
 """
 
 import numpy as np

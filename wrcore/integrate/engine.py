@@ -43,9 +43,10 @@ FIRST_STEP = 1e-5
 grow fivefold each."""
 
 T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP = range(7)
-"""Indices in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
-step, minimum accepted step (s), start of the run (s), and step of the factorised matrix (s). The minimum is over steps
-that the error limits: the step after them grows by less than the factor `GROW`."""
+"""Indices in the clock (all in s except ERROR). T: time reached. T_OLD: time before the last step. NEXT: length of the
+next attempt. ERROR: error norm of the last step. SMALLEST: minimum accepted step, over steps that the error limits (the
+step after them grows by less than the factor `GROW`). START: start of the run. MATRIX_STEP: step of the factorised
+matrix."""
 
 STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, COLLAPSES = range(6)
 HAS_RATE, RETRY, AGE, SINCE_FULL, TOUCHING = range(6, 11)

@@ -3,8 +3,8 @@
 In a curve all forces turn with the vehicle. In fixed axes the Jacobian of stiff elements is wrong after a turn of
 1 mrad. A method that keeps it must then follow the turn with short steps, although the vehicle's internal motion is
 steady. Increments of a step are therefore expressed in axes that rotate about the vertical at the constant rate omega.
-They are relative to a motion in which each body moves on a circle with its velocity, the ``drift`` d, and all other
-states change at a constant rate in these axes, their drift. With Q(t) the rotation since the Jacobian was computed, the
+They are relative to a motion in which each body moves on a circle with its velocity, the ``drift`` d. All other states
+change at a constant rate in these axes, their drift. With Q(t) the rotation since the Jacobian was computed, the
 state at a time t after the step's start (subscript 0) is
 
     r = r0 + D(t) d + Q u,   p = q(t) p0 + q (t d_p + u_p),   v = Q(t)/Q(0) v0 + Q (t d_v + u_v),   w likewise,

@@ -97,7 +97,7 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
         if not track.path.climbs:
             lateral, vertical = slope_y, values[1, 2 * wheel + 1]
         _rail_frame(frame, lateral, vertical, rail)
-        # the wheelset's centre from the rail's origin, turned into the rail's frame
+        # position of the wheelset's centre relative to the rail's origin, in the rail's frame
         gx, gy, gz = turned_back(frame, 0.0, y - place - shift, z - lift)
         _, ry, rz = turned_into(rail, gx, gy, gz)
         row[MOTION.side], row[MOTION.y], row[MOTION.z] = side, ry + place, rz

@@ -13,9 +13,10 @@ from wrcore.kernels.handles import other_at
 from wrcore.kernels.jit import jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED, OUTSIDE_TRAINING = range(6)
-"""Indices of the counters, in this order: evaluations of the equations, interpolations outside the creep table's range,
-patches solved on a grid, patches solved because the pair's table does not contain them, patches on fixed strips (their
-tips were not found), and surrogate patches far outside the range of its training."""
+"""Indices of the counters. EVALUATIONS: of the equations of motion. OUT_OF_RANGE: interpolations outside the creep
+table. ON_GRID: patches solved on a grid. SOLVED: patches solved because the pair's table does not contain them.
+ON_FIXED: patches on fixed strips, whose tips were not found. OUTSIDE_TRAINING: patches far outside the surrogate's
+training."""
 
 
 COUNTERS = 6
