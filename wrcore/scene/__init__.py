@@ -1,1 +1,1 @@
-"""What a person writes about a scene, checked and filled in, and the compiled model it stands for."""
+"""Scenes: check a scene file, fill in its defaults and compile it to a model."""

@@ -11,27 +11,29 @@ from wrcore.errors.checked_calls import UNMASKED, is_masked
 from wrcore.errors.checked_yaml import name_of_function, parse_value
 
 WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.parameters")
-"""Ends of the key paths at which a mapping stands for one value."""
+"""Ends of the key paths at which a mapping is one value; its keys are not merged one by one."""
 
 
 def changes_of(overrides, changes):
-    """Option, key path and value of each change that `load_scene` is asked for."""
+    """Return (option, key path, value) of each change in the arguments of `load_scene`."""
     texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
     try:
         flat = list(_flat(changes))
     except RecursionError:
         raise InputError("changes", "", "expected mappings that do not contain themselves") from None
-    check_disjoint({key for key, _ in flat}, "changes")  # of equal ones the last one counts
+    check_disjoint({key for key, _ in flat}, "changes")  # of equal keys the last one is used
     return [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in flat]
 
 
 PLACES = ({"x": "0", "y": "1", "z": "2"}, {"roll": "0", "pitch": "1", "yaw": "2"})
-"""What a change of a vehicle may call the numbers of a key that holds three."""
+"""Names that a change of a vehicle may use for the three numbers of a list, each with its index."""
 
 
 def check_disjoint(keys: Iterable[str], source, above=""):
-    """Raise an InputError where one of several keys holds another one, or is it by another name: which of them counts
-    would depend on their order. ``above`` is the field that holds the keys."""
+    """Raise an InputError if one of several keys contains another one or is a second name of it.
+
+    The result of such changes would depend on their order. ``above`` is the field that contains the keys.
+    """
     for (path, key), (inner, other) in pairwise(sorted((_places_of(key), key) for key in keys)):
         if inner[: len(path)] == path:
             what = "is" if len(inner) == len(path) else "is a part of"
@@ -40,7 +42,7 @@ def check_disjoint(keys: Iterable[str], source, above=""):
 
 
 def _places_of(key):
-    """A key path in parts, in which numbers of lists, and of points of a vehicle, have one name."""
+    """Split a key path into parts; list indices and axis names of a vehicle's points get one common spelling."""
     first, *parts = key.split(".")
     last = next((places[parts[-1]] for places in PLACES if parts and parts[-1] in places), None)
     if first == "vehicle" and len(parts) > 3 and parts[0] in ("elements", "joints") and last:
@@ -49,7 +51,7 @@ def _places_of(key):
 
 
 def with_value(data, key, value):
-    """A copy of a scene's data, as far as it changes, with another value at a path of keys."""
+    """Return a scene's data with another value at a path of keys; only the changed branches are copied."""
     return _with(data, key.split("."), value)
 
 
@@ -64,7 +66,10 @@ def _with(inner, path, value):
 
 
 def of_a_change(error, source, asked):
-    """The error of a scene's file, or of a change where that is what is wrong."""
+    """Return an error that names the change which caused it, or the given error if no change did.
+
+    ``asked`` are the changes from `changes_of`; a change causes an error if one's key path contains the other's.
+    """
     for option, key, _ in reversed(asked):
         near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")
         if error.source == source and near:
@@ -73,7 +78,7 @@ def of_a_change(error, source, asked):
 
 
 def _pair(text):
-    """Key path and value of ``key.path=value``."""
+    """Split ``key.path=value`` into key path and value."""
     key, equals, value = text.partition("=") if isinstance(text, str) else ("", "", "")
     if not equals or not key.strip():
         raise InputError("--set", text if isinstance(text, str) else short(text), "expected key.path=value")
@@ -81,7 +86,7 @@ def _pair(text):
 
 
 def _flat(changes, prefix=""):
-    """Pairs of a key path and a plain value; mappings are entered, but for those at `WHOLE`."""
+    """Yield pairs of key path and plain value from nested mappings; mappings at paths in `WHOLE` are one value."""
     for key, value in changes.items():
         path = prefix + str(key).replace("__", ".")
         if isinstance(value, Mapping) and not path.endswith(WHOLE):
@@ -91,19 +96,19 @@ def _flat(changes, prefix=""):
                 raise InputError("changes", path, UNMASKED)
             try:
                 yield path, json.loads(json.dumps(value, default=_plain))
-            except (ValueError, RecursionError):  # what contains itself, and numbers of thousands of digits
+            except (ValueError, RecursionError):  # a value that contains itself, or a number of thousands of digits
                 raise InputError("changes", path, f"expected a value as YAML holds it, got {short(value)}") from None
 
 
 def _plain(value):
-    """Numbers and arrays of numpy, paths and functions as YAML holds them."""
+    """Convert numpy numbers and arrays, paths and functions to values that YAML can hold."""
     if callable(value):
         return name_of_function(value) or repr(value)
     return value.tolist() if isinstance(value, np.generic | np.ndarray) else str(value)
 
 
 def set_at(data, key, value, source):
-    """Set the value at a path of keys, or take the key out for None; a number means one of a list."""
+    """Set the value at a path of keys, or remove the key if the value is None; a number in the path is a list index."""
     *path, last = key.split(".")
     for part in path:
         data = data[_list_index(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
@@ -118,7 +123,7 @@ def set_at(data, key, value, source):
 
 
 def _list_index(items, part, key, source):
-    """The place in a list that a part of a key path says."""
+    """Return the list index that a part of a key path names."""
     if not part.isdecimal() or int(part) >= len(items):
         raise InputError(source, key, f"expected the number of one of {len(items)} in the list, from 0, got {part!r}")
     return int(part)

@@ -1,5 +1,6 @@
-"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``, and what wheels see of them
-and of their own shapes.
+"""Rails that change along the track, such as a crossing, from a scene's key ``track.crossing``.
+
+The module also builds the contact geometry of each wheel on changing or corrugated rails and of wheels out of round.
 """
 
 import json
@@ -28,45 +29,48 @@ from wrcore.scene.pairs import find_file
 from wrcore.track.changing_rails import crossing_of, layout_of_corrugation, layout_of_rail, layout_of_wheel
 
 JOINED = 1e-4
-"""How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
+"""Largest distance of the first and the last slice's surface from the adjoining plain rail, m."""
 
 STEEPEST_ALONG = 0.2
-"""Slopes along the track that a wheel is laid on: what it touches lies within `REACH` of its axle."""
+"""Slopes of a surface along the track must be below this: then the contact lies within `REACH` (m) of the axle."""
 
 RUNNING = -0.03, 0.01, -0.012
-"""Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
+"""Part of the profile that is checked for joints and overshoot: lateral coordinates from and to, lowest height, m."""
 
 SWING = 5e-4
-"""By how much a rail may leave the heights of the slices before and behind, m: more is told."""
+"""Overshoot of a rail beyond the heights of the slices before and behind above which wrcore warns, m."""
 
 BENEATH, BELOW, CROWN = 0.08, -0.03, 3e-3
-"""Wheels find heads up to this lateral coordinate, no lower than this height, and run on so much of them, m."""
+"""Bounds of a rail head, m: largest lateral coordinate, lowest height of its top, depth of the running surface below
+the top."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCrossing:
-    """A stretch of track where rails change."""
+    """A stretch of track where one rail or both change."""
 
     rails: tuple
-    """`RailSlices` of the left and the right rail, in the coordinates of the plain ones; None where one is the same
-    everywhere."""
+    """`RailSlices` of the left and the right rail, in the coordinates of the plain rails; None for a rail that does not
+    change."""
     at: float
-    """Arc length of their s = 0, m."""
+    """Arc length of the track at s = 0 of the slices, m."""
     backwards: bool
-    """Whether their s counts against that of the track."""
+    """Whether s of the slices decreases along the track."""
 
     @property
     def ends(self):
-        """Arc lengths between which rails are not the plain ones, m."""
+        """Arc lengths between which a rail differs from the plain rail, m."""
         slices = next(rail for rail in self.rails if rail is not None)
         low, high = slices.s[0] - REACH - BLEND, slices.s[-1] + REACH + BLEND
         return (self.at - high, self.at - low) if self.backwards else (self.at + low, self.at + high)
 
 
 def read_crossings(data, vehicle, pairs, folder, source):
-    """`PlacedCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
-    the schema; ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail
-    they join."""
+    """Return a `PlacedCrossing` for each stretch where a scene's rails change, sorted along the track.
+
+    ``data`` is the scene's content, checked against the schema; ``pairs`` are the `WheelOnRail` of at least one
+    wheelset. Stretches whose slices are all equal are left out, as they are the plain rail.
+    """
     specs, laid, known = data["track"].get("crossing", []), [], {}
     for k, spec in enumerate([specs] if isinstance(specs, dict) else specs):
         field = "track.crossing" if isinstance(specs, dict) else f"track.crossing.{k}"
@@ -87,7 +91,7 @@ def read_crossings(data, vehicle, pairs, folder, source):
 
 
 def _rails(spec, depth, pairs, folder, source, field):
-    """Rails of a `PlacedCrossing`, None where they are plain."""
+    """Return the rails of a `PlacedCrossing`, or None if all slices are equal."""
     slices = _slices(spec["slices"], folder, source, f"{field}.slices")
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     rails = [
@@ -102,7 +106,7 @@ def _rails(spec, depth, pairs, folder, source, field):
 
 
 def _check_begin(crossing, vehicle, source, field):
-    """An InputError where a wheelset stands on it at the beginning."""
+    """Raise an InputError if a wheelset stands on the crossing at the beginning of the run."""
     low, high = crossing.ends
     for name, x in zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True):
         if low < x < high:
@@ -117,10 +121,11 @@ MADE = {
     "switch": (Switch, 100.0, 5000.0, "a switch of 100 to 5000 m, such as switch:500"),
     "joint": (Joint, 1e-4, 0.05, "a joint of 0.0001 to 0.05 rad, such as joint:0.01"),
 }
-"""Rails by a formula: their first dimension, within bounds, and what to say beyond these."""
+"""Rails made by a formula: class, lower and upper bound of its dimension, and text of the error outside the bounds."""
 
 
 def _slices(spec, folder, source, field) -> RailSlices:
+    """Return the slices that a scene names: a file, or a rail made by a formula."""
     how = spec if isinstance(spec, dict) else {"slices": spec}
     named = how.get("slices")
     kind, colon, value = named.partition(":") if isinstance(named, str) else ("", "", "")
@@ -138,7 +143,7 @@ def _slices(spec, folder, source, field) -> RailSlices:
 
 
 def _check_joints(slices, plain, source, field):
-    """An InputError where the first or the last slice is no continuation of the plain rail."""
+    """Raise an InputError if the first or the last slice does not continue the plain rail within `JOINED`."""
     low, high, depth = RUNNING
     u = np.arange(low, high, 1e-3)
     f, slope = plain(u), plain(u, 1)
@@ -153,7 +158,7 @@ def _check_joints(slices, plain, source, field):
 
 
 def _check_surface(slices, source, field):
-    """An InputError where a rail has no head under the wheels, or one that is too steep along the track."""
+    """Raise an InputError if a rail has no head under the wheels, or a head that is too steep along the track."""
     between = 0.5 * (slices.s[1:] + slices.s[:-1])
     s, u = np.sort(np.concatenate([slices.s, between])), np.arange(RUNNING[0], BENEATH, 1e-3)
     for part in np.array_split(s, math.ceil(s.size / 500)):
@@ -170,8 +175,10 @@ def _check_surface(slices, source, field):
 
 
 def _warn_of_swings(slices, where):
-    """Say where the splines through the slices leave the heights of both neighbours; a notch between two heads, which
-    moves along, is none."""
+    """Warn if the splines through the slices leave the range of heights of both neighbouring slices.
+
+    A notch between two heads that moves laterally from slice to slice is no overshoot.
+    """
     u, worst = np.arange(RUNNING[0], RUNNING[1], 1e-3), (0.0, 0.0)
     for part in np.array_split(np.arange(slices.s.size - 1), math.ceil(slices.s.size / 500)):
         ends, middle = slices.s[[part, part + 1]], 0.5 * (slices.s[part] + slices.s[part + 1])
@@ -187,7 +194,7 @@ def _warn_of_swings(slices, where):
 
 
 def read_corrugation(data, crossings, shapes, source):
-    """`Corrugation` of a scene's content, None where its rails are smooth."""
+    """Return the `Corrugation` that a scene's content describes, or None for smooth rails."""
     spec = data["track"].get("corrugation")
     if spec is None:
         return None
@@ -206,15 +213,17 @@ def read_corrugation(data, crossings, shapes, source):
 
 
 def sections_under_wheels(crossings, shapes, corrugation, pairs, starts):
-    """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
-    and the `wrcore.track.changing_rails.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc
-    lengths (k,) at which wheelsets begin, m."""
+    """Return the `ContactGeometry` of each wheel on the plain rail and the `wrcore.track.changing_rails.Crossing`.
+
+    All geometries are of one type, as kernels need. ``pairs`` are those of all wheelsets, left and right, from the
+    front. ``shapes`` come from `read_out_of_round`; ``starts`` (k,) are the arc lengths at which wheelsets begin, m.
+    """
     known: dict[tuple, int] = {}
     tables: list[SectionTable] = []
     geometries, of_wheels = [], []
 
     def number(pair, what, make, backwards=False):
-        """Of the table of what a pair's wheel sees, which is made once."""
+        """Return the index of the section table of a pair and a shape; make the table if it is missing."""
         key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(what), backwards
         if key not in known:
             known[key] = len(tables)
@@ -248,7 +257,7 @@ def sections_under_wheels(crossings, shapes, corrugation, pairs, starts):
 
 
 def _on_plain_rail(pair, tables):
-    """`ContactGeometry` of a wheel that passes tables, whose bounds hold for all of them."""
+    """Return the `ContactGeometry` of a wheel on the plain rail; its error bounds hold for all tables it passes."""
     if not tables:
         return pair.geometry._replace(along=np.zeros((len(pair.geometry.rail), 5)))
     errors = np.max([table.geometry.zone_planar_errors for table in tables], axis=0)
@@ -257,5 +266,5 @@ def _on_plain_rail(pair, tables):
 
 @cache
 def warn_of_rigid_rails(source):
-    """Say, once, that impact on rails that do not give is no result."""
+    """Warn once that impact forces on rigid rails are meaningless."""
     warn(f"{source}: impact on rigid rails is no result; track.support says how the track gives")

@@ -10,7 +10,10 @@ from wrcore.track.check_rail import CheckRails, no_check_rails
 
 
 def read_check_rails(data, pairs, source):
-    """`CheckRails` of a scene's content, checked against the schema, for the `WheelOnRail` of all wheels."""
+    """Return the `CheckRails` of a scene's content, checked against the schema.
+
+    ``pairs`` are the `WheelOnRail` of all wheels, left and right of each wheelset from the front.
+    """
     specs = data["track"].get("check_rails", ())
     rows = [
         [_row(data["track"], spec, pair[list(SIDES).index(spec["rail"])], source, f"track.check_rails[{k}]")
@@ -23,7 +26,7 @@ def read_check_rails(data, pairs, source):
 
 
 def _row(track, spec, pair, source, field):
-    """Of a check rail beside the wheel of a `WheelOnRail`."""
+    """Return the row of `CheckRails` for one check rail and the wheel of a `WheelOnRail`."""
     flare, face = spec["flare"], 0.5 * track["gauge"] - spec["flangeway"]
     if not 2.0 * flare["length"] <= spec["length"]:
         expected = f"expected at least two flares of {flare['length']:g} m, got {spec['length']:g} m"

@@ -1,4 +1,4 @@
-"""From a checked scene to a compiled model and its initial state."""
+"""Compilation of a checked scene to a model for kernels and its initial state."""
 
 import json
 from collections.abc import Callable
@@ -31,11 +31,12 @@ from wrcore.vehicle.element_parts import try_laws
 from wrcore.wheels.contact_model import ContactModel
 
 LIKE_FRICTION = 0.8
-"""Of a rail's largest friction: where it falls below, it is said what looked-up contact errs by."""
+"""Fraction of a rail's largest friction coefficient: if friction falls below it, a warning states the error of the
+lookup table."""
 
 
 def _allow_laws(scene):
-    """Call the laws of the elements of a scene for a test, unless the scene is one whose laws may not be run."""
+    """Test-call the user-defined laws of a scene's force elements; InputError if the scene's laws may not be run."""
     try:
         scene.laws.allow()
     except InputError as error:
@@ -51,12 +52,14 @@ def compile_scene(
     shared: dict[Any, Any] | None = None,
     meanwhile: Callable[[Model], AbstractContextManager] = nullcontext,
 ) -> tuple[Model, np.ndarray]:
-    """A scene's model, as kernels take it, and its initial state (13 n,): wheelsets at rest on the rails vertically and
-    in roll, rolling forward without slip.
+    """Return a scene's model for kernels and its initial state (13 n,).
 
-    ``progress`` wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``. ``shared`` keeps what
-    does not change from one scene of a series to the next (contact geometry, creep table, static equilibrium); it knows
-    vehicles, profiles and tracks by their identity. ``meanwhile`` makes of the model a context for what follows on it.
+    In the initial state the wheelsets are in vertical and roll equilibrium on the rails and roll forward without slip.
+
+    ``progress`` wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``. ``shared`` caches parts
+    that do not change from one scene of a series to the next: contact geometry, creep table, static equilibrium. Its
+    keys are the identities of vehicles, profiles and tracks. ``meanwhile(model)`` returns a context manager in which
+    the equilibrium and the initial state are computed.
     """
     shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
@@ -70,7 +73,7 @@ def compile_scene(
         )
     _kept(shared, "laws", (vehicle, scene.laws), lambda: _allow_laws(scene))
     track = _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
-    parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # known by their identity
+    parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # keys of ``shared`` by identity
     friction = friction_of(scene)
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
         tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
@@ -122,7 +125,7 @@ def compile_scene(
 
 
 def _kept(shared, name, key, make):
-    """The part of a name that was made for a key before, or is made now."""
+    """Return the part stored in ``shared`` under name and key; make and store it if it is missing."""
     if (name, key) not in shared:
         shared[name, key] = make()
     return shared[name, key]

@@ -1,4 +1,4 @@
-"""A scene's control laws of the user's own."""
+"""User-defined control laws of a scene."""
 
 import math
 
@@ -13,13 +13,16 @@ from wrcore.kernels import own
 
 
 def outputs_of(spec):
-    """Names of the outputs of all control laws, in their order: that of the laws' names, as files of runs have it."""
+    """Return the names of the outputs of all control laws, laws in alphabetical order as in run files."""
     return [name for _, item in sorted((spec or {}).items()) for name in item["outputs"]]
 
 
 def read_controls(data, vehicle, laws, source, call=True):
-    """Controls from a scene's checked ``control`` (or none): an InputError names the law and the key. ``laws`` finds
-    the functions; with ``call`` each gets a test call with what is measured in the vehicle's nominal position."""
+    """Return the `Controls` of a scene's checked ``control`` (or none); an InputError names the law and the key.
+
+    ``laws`` finds the functions. With ``call`` each function gets a test call with the inputs that are measured in the
+    vehicle's nominal position.
+    """
     spec, drive = data.get("control") or {}, data.get("drive") or {}
     if not spec:
         return no_controls()
@@ -68,7 +71,7 @@ def read_controls(data, vehicle, laws, source, call=True):
 
 
 def _track_states(data, vehicle):
-    """Internal states that a flexible track adds to those of the elements."""
+    """Return the number of internal states that a flexible track adds to those of the elements."""
     support = data["track"].get("support")
     if not support:
         return 0
@@ -79,7 +82,7 @@ def _track_states(data, vehicle):
 
 
 def _actuators(vehicle):
-    """Places of the forces of actuators in the state vector, by their names."""
+    """Return the index of each actuator's force in the state vector, by the actuator's name."""
     elements, inner = vehicle.elements, STATE_SIZE * len(vehicle.bodies.mass)
     number = law.LAWS.index(given)
     return {
@@ -89,7 +92,11 @@ def _actuators(vehicle):
 
 
 def _input(text, data, vehicle, source, field):
-    """Row of an input, and about what it measures in nominal position."""
+    """Return the row of a control law's input and its approximate value in nominal position.
+
+    The row holds the indices of quantity and body, the number of the nearest wheelset, and the index in the state
+    vector of the wheels' speed difference (-1 unless the wheels are independent).
+    """
     name, _, channel = text.rpartition(".")
     channel = "x_m" if channel == "s_m" else channel
     if name not in vehicle.body_names:
@@ -112,7 +119,7 @@ def _input(text, data, vehicle, source, field):
 
 
 def _found(item, nominal, laws, source, field, call):
-    """The function of a law; with ``call`` after a test call."""
+    """Return the function of a control law; with ``call`` it is test-called first."""
     if not all(map(math.isfinite, nominal)):
         raise InputError(source, field, "expected a vehicle with wheelsets for what is measured")
     try:

@@ -1,4 +1,4 @@
-"""The creep law of a scene: checked, and with its data."""
+"""Check of a scene's creep law, and the law's data for kernels."""
 
 import os
 from typing import Any
@@ -12,7 +12,7 @@ from wrcore.scene.pairs import find_file
 
 
 def check_creep(contact, source, laws):
-    """Complete what a scene says of its creep law, and refuse what does not belong to the law."""
+    """Fill in defaults of a scene's creep law; raise an InputError for keys that do not belong to the law."""
     creep = contact["creep"]
     creep.setdefault("tolerance", DEFAULT_TOLERANCE)
     if creep["model"] not in LAWS:
@@ -36,13 +36,13 @@ def check_creep(contact, source, laws):
 
 
 def announce(text):
-    """One line on stderr before work that takes long, whoever listens; none with ``WRCORE_PROGRESS=0``."""
+    """Print a line on stderr before long work, unless the environment has ``WRCORE_PROGRESS=0``."""
     if os.environ.get("WRCORE_PROGRESS") != "0":
         say(text)
 
 
 def creep_of(scene: Any, progress: Any) -> Any:
-    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
+    """Return the data of the scene's creep law; the law ``table`` loads a creep table, or builds it."""
     contact = scene.data["contact"]
     creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
     factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
@@ -63,7 +63,7 @@ def creep_of(scene: Any, progress: Any) -> Any:
 
 
 def _creep_law(scene):
-    """The creep law of the user that a scene names."""
+    """Return the user-defined creep law that a scene names."""
     try:
         return user_law(scene.data["contact"]["creep"]["model"], scene.laws)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""Scenes: a validated description becomes a compiled model and its initial state."""
+"""Scenes: read, change and check the description of a simulation."""
 
 from __future__ import annotations
 
@@ -49,28 +49,28 @@ from wrcore.vehicle.train import train_of
 
 @dataclass(frozen=True, repr=False)
 class Scene:
-    """A checked scene: its data with all defaults, and what its files hold.
+    """A checked scene: its data with all defaults, and the content of its files.
 
     Attributes
     ----------
     data : dict
         The scene file's content after overrides and defaults; plain JSON values.
     source : str
-        Named in errors.
+        Name of the scene in error messages.
     vehicle : Vehicle
     wheel, rail : ProfileCurve
     track : Track
     pairs : tuple of WheelOnRail
-        Of each wheel, left and right of wheelset after wheelset; empty where all are alike.
-    crossings : tuple of LaidCrossing
+        One for each wheel, left and right, wheelset after wheelset; empty if all are equal.
+    crossings : tuple of PlacedCrossing
         Stretches where rails change along the track.
     out_of_round : tuple
-        Shape and angle at the beginning of each wheel, in the order of ``pairs``; empty where all are round.
+        Shape and initial angle (rad) of each wheel, in the order of ``pairs``; empty if all wheels are round.
     corrugation : Corrugation, optional
     files : dict
-        SHA-256 of all files that were read for it, by path.
+        SHA-256 of all files that were read for the scene, by path.
     laws : Laws
-        Functions of the user that it names: read, and not run before the scene is compiled.
+        User-defined functions that the scene names. They are read with the scene and first run when it is compiled.
 
     Examples
     --------
@@ -97,17 +97,17 @@ class Scene:
 
     @property
     def detection(self) -> str:
-        """``planar``, ``spatial`` or ``auto``."""
+        """Contact detection: ``planar``, ``spatial`` or ``auto``."""
         return self.data["contact"]["detection"]
 
     @cached_property
     def alike(self) -> WheelOnRail:
-        """``wheel`` on ``rail``."""
+        """`WheelOnRail` of the scene's ``wheel`` on its ``rail``, for wheels that do not differ."""
         return _alike(self.vehicle, self.wheel, self.rail, self.track)[0]
 
     @checked
     def pair(self, side: Annotated[str, OneOf(SIDES)] = "left", wheelset: Annotated[int, Within(0)] = 0) -> WheelOnRail:
-        """A side of a wheelset, counted from the front."""
+        """Return the `WheelOnRail` of one side of a wheelset; wheelsets are numbered from the front, from 0."""
         if wheelset >= len(self.vehicle.wheelset_names):
             raise InputError(self.source, "wheelset", f"expected a number below that of wheelsets, got {wheelset}")
         return self.pairs[2 * wheelset + list(SIDES).index(side)] if self.pairs else self.alike
@@ -121,18 +121,20 @@ class Scene:
 
 
 Source = Scene | str | PathLike[str] | Mapping[str, Any]
-"""What stands for a scene: a checked one, its file, or the file's content."""
+"""Types that are accepted as a scene: a checked `Scene`, the path of its file, or the file's content."""
 
 
 def as_scene(scene: Source) -> Scene:
-    """A scene as it is, or what stands for one as :func:`load_scene` reads it."""
+    """Return a `Scene` unchanged; read a file or its content with :func:`load_scene`."""
     return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
 def scene_of(run: Any, scene: Source | None, asker: str, trust: bool = False) -> Scene:
-    """The scene of a run: what stands for it, or read anew by what the run says. Its files are in the working directory
-    or, if they hold what the run's did, beside the examples. ``asker`` is named in errors; with ``trust`` the laws that
-    a run of a file names may be run."""
+    """Return the scene of a run: the given ``scene``, or the scene that the run stores.
+
+    Files that a stored scene names are read from the working directory, or from the examples if they have the digest
+    that the run stores. ``asker`` is named in errors. With ``trust`` the laws that a run file names may be run.
+    """
     if scene is not None:
         return as_scene(scene)
     try:
@@ -150,21 +152,21 @@ def scene_of(run: Any, scene: Source | None, asker: str, trust: bool = False) ->
 def load_scene(
     scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), trust: bool = False, **changes: Any
 ) -> Scene:
-    """Read and check a scene. Laws of the user that it names are read, and run when the scene is simulated.
+    """Read and check a scene. User-defined laws that it names are read, and are run when the scene is simulated.
 
     Parameters
     ----------
     scene : str, Path, dict or Scene
-        Scene file, the content of one (then paths count from the working directory), or a scene to be changed.
+        Scene file, its content (then paths are relative to the working directory), or a scene to be changed.
     overrides : sequence of str, or dict
         ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them; or values by ``key.path``.
-        ``null`` (None) takes a key out of the scene. Keys of the scene that a change makes void, such as
-        ``contact.resolution`` beside ``contact.patch=moment``, are left out, and one line says so.
+        ``null`` (None) removes a key from the scene. Keys of the scene that a change makes void, such as
+        ``contact.resolution`` with ``contact.patch=moment``, are left out; a line on stderr names them.
     trust : bool
         Whether the scene of a run file (``wr.load_run(path).scene``) may run the laws that it names.
     **changes
         Further values by key: ``speed=30``, ``integration__duration=2.0`` (two underscores stand for the dot) or
-        ``initial={"y": 0.003, "yaw": 0.001}`` (what the mapping does not name stays).
+        ``initial={"y": 0.003, "yaw": 0.001}`` (other keys of the mapping are unchanged).
 
     Returns
     -------
@@ -187,7 +189,7 @@ def load_scene(
 
 
 def changed_by_caller(scene: Scene, overrides: Iterable[str] | Mapping[str, Any], undecided: Iterable[str]) -> Scene:
-    """Change a scene as :func:`load_scene` does; keys that values of ``undecided`` keys may make void stay."""
+    """Return a scene with changes as in :func:`load_scene`; keys that ``undecided`` keys may make void are kept."""
     return _asked_for(scene, changes_of(overrides, {}), False, undecided)
 
 
@@ -196,13 +198,16 @@ def _asked_for(scene, asked, trust, undecided=()):
 
 
 def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path, undecided: Iterable[str] = ()) -> Scene:
-    """A scene with changes, as :func:`load_scene` takes them, that a file in ``folders`` says (a sweep, a plan): laws
-    that they name lie there, or where those of the scene do. Keys that ``undecided`` keys may make void stay."""
+    """Return a scene with the changes that a file in ``folders``, such as a sweep or a wear plan, states.
+
+    ``changes`` are as in :func:`load_scene`. Laws that they name are searched in ``folders`` and in the folders of the
+    scene. Keys that ``undecided`` keys may make void are kept.
+    """
     return _loaded(scene, changes_of(changes, {}), folders, undecided=undecided)
 
 
 def _loaded(scene, asked, folders, named=(), trust=False, undecided=()):
-    """The scene after the changes ``asked``; other arguments as for `Laws` and `load_scene`."""
+    """Return the scene after the changes ``asked``; the other arguments are those of `Laws` and `load_scene`."""
     before, trusted = None, trust or not isinstance(scene, StoredScene)
     if isinstance(scene, Scene):
         source, data, before, trusted = scene.source, copy.deepcopy(scene.data), scene.laws.known, scene.laws.trusted
@@ -220,10 +225,10 @@ def _loaded(scene, asked, folders, named=(), trust=False, undecided=()):
 
 
 def _checked(data: dict[str, Any], source: str, laws: Laws, changes=None, undecided=()) -> Scene:
-    """The scene of a file's content, with whatever other files it names; ``laws`` finds those of the user."""
+    """Return the checked scene of a file's content and of the files that it names; ``laws`` finds user functions."""
     data, folder = validate(data, "scene", source), laws.folders[0]
     leave_out_void_keys(data, source, changes, undecided)
-    digests = digests_of_files(data, folder)  # before they are read: what changes meanwhile does not go unseen
+    digests = digests_of_files(data, folder)  # before the files are read, so that a change during reading is detected
     find = partial(find_file, folder=folder, source=source, field="vehicle.parameters")
     with laws.present():
         vehicle = vehicle_of(data["vehicle"], find, source, laws)
@@ -252,13 +257,13 @@ def _checked(data: dict[str, Any], source: str, laws: Laws, changes=None, undeci
 
 
 def _alike(vehicle, wheel, rail, track):
-    """The `WheelOnRail` of either side of every wheelset where all are alike."""
+    """Return the `WheelOnRail` of the left and the right side, where all wheels and rails are equal."""
     distance = track.rail_distance(rail)
     return (WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, distance),) * 2
 
 
 def _with_points(track, folder, source):
-    """The scene's track with the place of its measured irregularity, which is looked for as all other files are."""
+    """Return the scene's track with the absolute paths of its irregularity files."""
     irregularity = track.get("irregularity")
     points = irregularity.get("points") if isinstance(irregularity, dict) else None
     names = [points] if isinstance(points, str) else points
@@ -269,5 +274,5 @@ def _with_points(track, folder, source):
 
 
 def friction_of(scene: Scene) -> Friction:
-    """Friction of a scene's rails; a law of the user is called."""
+    """Return the `Friction` of a scene's rails; a user-defined friction law is called."""
     return read_friction(scene.data["contact"]["friction"], scene.source, scene.laws)

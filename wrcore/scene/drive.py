@@ -10,12 +10,14 @@ from wrcore.scene.schedule import read_schedule
 from wrcore.track.schedule import pack_schedules
 from wrcore.vehicle.layout import FRAME_NAME
 
-OVER = ("time", "arc_length")  # what tables are over, in the order of the constants in `wrcore.forces.drive`
+OVER = ("time", "arc_length")  # abscissas of tables, in the order of TIME and ARC_LENGTH in `wrcore.forces.drive`
 
 
 def read_drive(spec, vehicle, source, commanded=()):
-    """Drive (motors, brakes, controller) from a scene's checked ``drive``, or from None; ``commanded`` are the outputs
-    of control laws by their names. An InputError names the motor or brake and the key."""
+    """Return the `Drive` (motors, brakes, speed controller) of a scene's checked ``drive``, or of None.
+
+    ``commanded`` are the names of the outputs of control laws. An InputError names the motor or brake and the key.
+    """
     if spec is None:
         return no_drive()
     items = [("motors", item) for item in spec["motors"]] + [("brakes", item) for item in spec["brakes"]]
@@ -39,8 +41,10 @@ def read_drive(spec, vehicle, source, commanded=()):
 
 
 def _check_names(items, vehicle, source):
-    """Motors, brakes, the controller and the vehicle's actuators are inputs of a session and outputs of control laws by
-    their names: no two have the same."""
+    """Raise an InputError if motors, brakes, controller or the vehicle's actuators share a name.
+
+    Sessions address their inputs, and control laws their outputs, by these names.
+    """
     known = {"controller": "the speed controller is drive.controller"}
     known |= {
         item["name"]: f"elements.{item['name']} of the vehicle is an actuator"
@@ -54,7 +58,7 @@ def _check_names(items, vehicle, source):
 
 
 def _actuator(group, item, vehicle, source, tables, commanded):
-    """Row and lever of a motor or brake; its table is added to the others."""
+    """Return row and lever of a motor or brake for `Drive`; its table is appended to ``tables``."""
     field, (wheelset, body) = f"drive.{group}.{item['name']}", item["bodies"]
     if wheelset not in vehicle.wheelset_names:
         known = ", ".join(vehicle.wheelset_names)
@@ -81,7 +85,7 @@ def _actuator(group, item, vehicle, source, tables, commanded):
 
 
 def _wheel(item, vehicle, source, field):
-    """Which wheel of a wheelset a motor or brake acts on: 1 left, -1 right, 0 both, as one."""
+    """Return the wheel that a motor or brake acts on: 1 left, -1 right, 0 both wheels of a solid wheelset."""
     independent = vehicle.data["bodies"][item["bodies"][0]].get("independent_wheels", False)
     if independent and "wheel" not in item:
         expected = f"expected left or right, as the wheels of {item['bodies'][0]} turn independently of each other"
@@ -93,7 +97,10 @@ def _wheel(item, vehicle, source, field):
 
 
 def _controller(spec, rows, vehicle, source, tables):
-    """Row and gains of the controller; what it is over counts at the foremost of its wheelsets."""
+    """Return row and gains of the controller; its speed table is appended to ``tables``.
+
+    The arc length of the speed table is that of the foremost wheelset that the controller drives.
+    """
     body = _body(spec["body"], vehicle, source, "drive.controller.body")
     over, points = read_schedule(spec["speed"], "speed", OVER, source, "drive.controller.speed")
     tables.append(points)
@@ -104,7 +111,7 @@ def _controller(spec, rows, vehicle, source, tables):
 
 
 def _body(name, vehicle, source, field):
-    """Number of a body."""
+    """Return the index of a body in the state vector's order."""
     if name not in vehicle.body_names:
         raise InputError(source, field, one_of(vehicle.body_names, name))
     return vehicle.body_names.index(name)

@@ -1,4 +1,4 @@
-"""Scenes, vehicles, sweeps and wear plans to start from: ``config/`` of the project, which a wheel carries along."""
+"""Example scenes, vehicles, sweeps and wear plans: ``config/`` of the project, also part of the installed package."""
 
 import os
 import shutil
@@ -14,29 +14,30 @@ PARTS = ("scenes", "vehicles", "sweeps", "wear")
 
 
 def examples_folder() -> Path:
-    """The folder that holds `PARTS`: in an installed package its own, in a checkout ``config/``."""
+    """Return the folder that holds `PARTS`: ``examples/`` of an installed package, or ``config/`` of a checkout."""
     inside = PACKAGE / "examples"
     return inside if inside.is_dir() else PACKAGE.parent / "config"
 
 
 @checked
 def example(name: str) -> Path:
-    """Path of an example scene.
+    """Return the path of an example scene.
 
     Parameters
     ----------
     name : str
-        Such as ``wheelset``, ``suspended_wheelset``, ``trailer_vehicle``, ``metro_car``, ``locomotive``.
+        Name of an example, such as ``wheelset``, ``suspended_wheelset``, ``trailer_vehicle``, ``metro_car`` or
+        ``locomotive``.
 
     Returns
     -------
     Path
-        Of a YAML file, which :func:`wrcore.load_scene` and :func:`wrcore.simulate` take.
+        Path of a YAML file, which :func:`wrcore.load_scene` and :func:`wrcore.simulate` accept.
 
     Raises
     ------
     InputError
-        For a name that no example has.
+        If no example has the name.
 
     Examples
     --------
@@ -51,8 +52,11 @@ def example(name: str) -> Path:
 
 
 def copy_examples(folder: str | os.PathLike[str]) -> Path:
-    """Copy scenes, vehicles, sweeps and wear plans into a folder (returned), to start from; an InputError where there
-    is already something of that name: nothing is written over. Where the disk is full nothing stays behind."""
+    """Copy the example scenes, vehicles, sweeps and wear plans into a folder and return the folder.
+
+    An InputError is raised if a file or subfolder of such a name exists; no file is overwritten. If copying fails,
+    such as on a full disk, the new folders are removed.
+    """
     folder = Path(folder)
     for place in (folder, *(folder / part for part in PARTS)):
         if place.exists() and (place != folder or not place.is_dir()):

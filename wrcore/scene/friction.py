@@ -1,4 +1,4 @@
-"""Friction of a scene's rails: one coefficient, one per rail, tables along the track, and how it falls with slip."""
+"""Friction of a scene's rails: one coefficient, one per rail, or tables along the track; it may fall with slip."""
 
 from typing import NamedTuple
 
@@ -11,33 +11,35 @@ from wrcore.scene.schedule import read_schedule
 from wrcore.track.schedule import Schedules, pack_schedules
 
 LEAST, MOST = 1e-9, 1.0
-"""Bounds of a coefficient."""
+"""Bounds of a friction coefficient."""
 
 LEAST_FACTOR = 0.01
-"""Of friction that falls."""
+"""Smallest factor by which friction may fall with slip velocity."""
 
 
 class Friction(NamedTuple):
-    """What a model needs to know of it."""
+    """Friction coefficients of both rails and their dependence on slip velocity."""
 
     largest: float
-    """Largest coefficient anywhere; the only one where the rails do not differ."""
+    """Largest coefficient of both rails; the only one if friction is constant and equal on both."""
     rails: Schedules
-    """Over arc length, left and right; empty for one coefficient."""
+    """Coefficients over arc length, left and right; empty if ``largest`` holds everywhere."""
     ratio: float = 1.0
-    """A of mu = mu0 ((1 - A) exp(-B w) + A)."""
+    """A of mu = mu0 ((1 - A) exp(-B w) + A), with the slip velocity w."""
     decay: float = 0.0
-    """B, s/m; of a law of the user's own, samples per m/s."""
+    """B, s/m; for a user-defined law, samples per m/s."""
     factors: np.ndarray = np.zeros(0)
-    """(n,): samples of such a law, from slip velocity 0 on."""
+    """(n,): samples of a user-defined law over slip velocity, equally spaced from 0."""
     least_share: float = 1.0
-    """Of a rail's largest coefficient, the smallest one along it."""
+    """Smallest ratio of a coefficient along a rail to the same rail's largest coefficient."""
 
 
 def read_friction(spec, source, laws, call=True):
-    """Friction from a scene's ``contact.friction``, checked against the schema; an InputError where keys do not go
-    together or arc lengths do not rise. ``laws`` finds laws of the user; where these are not to be called (``call``),
-    the keys are checked and the result is None."""
+    """Return the `Friction` of a scene's ``contact.friction``, checked against the schema.
+
+    An InputError is raised if keys exclude each other or arc lengths do not increase. ``laws`` finds user-defined laws.
+    If these exist and ``call`` is False, only the keys are checked and the result is None.
+    """
     field = "contact.friction"
     if not isinstance(spec, dict):
         return Friction(float(spec), pack_schedules([]))
@@ -69,7 +71,10 @@ def _table(spec, source, field):
 
 
 def _by_law(spec, source, field, laws, call):
-    """Tables of the left and the right rail from a function of arc length; None where it is not to be called."""
+    """Return tables of the left and the right rail, sampled from a user's function of arc length.
+
+    The result is None if ``call`` is False.
+    """
     _needs(spec, ("length", "spacing"), source, field)
     s, values = own.on_grid(spec, 2, laws, source, field, call)
     if values is None:
@@ -79,7 +84,7 @@ def _by_law(spec, source, field, laws, call):
 
 
 def _falling(spec, source, field, laws, call):
-    """Ratio, decay and factors; None where they are those of a law that is not to be called."""
+    """Return ratio, decay and factors of falling friction; None for a user-defined law if ``call`` is False."""
     if spec is None:
         return ()
     if "law" not in spec:
@@ -94,7 +99,7 @@ def _falling(spec, source, field, laws, call):
     if values is None:
         return None
     _within(values, LEAST_FACTOR, 1.0, "factors", source, f"{field}.law")
-    return 0.0, (len(w) - 1) / (w[-1] - w[0]), np.array(values[0])  # one to write to: kernels know no other type
+    return 0.0, (len(w) - 1) / (w[-1] - w[0]), np.array(values[0])  # writable, as kernels need
 
 
 def _needs(spec, keys, source, field):

@@ -1,5 +1,7 @@
-"""Tables of what wheels see of rails that change, and wheels of slices of theirs, kept in the cache: they take seconds,
-and one serves many runs."""
+"""Disk cache of section tables for changing rails and for wheels described by slices.
+
+A table takes seconds to compute and serves many runs.
+"""
 
 import hashlib
 import io
@@ -18,17 +20,17 @@ from wrcore.kernels.cache import drop_unused, table_folder
 from wrcore.kernels.told import say_if_long
 
 FORM = 1
-"""Number of the form of these tables. Count it up with every change to the numbers in a table: those in caches are then
-left alone, and made anew. A test compares a table with one that is known."""
+"""Version of these tables. Increase it with every change to the numbers in a table, so that cached tables are ignored
+and computed again. A test compares a table with a stored one."""
 
 SEAL = 32
-"""Bytes of the digest behind a file's content."""
+"""Length of the SHA-256 digest at the end of a file, bytes."""
 
 TABLE_FIELDS = "begin", "step", "sections", "strips", "bounds"
 
 
 def kept_table(pair, slices, backwards, lateral=None):
-    """`section_table` of slices in place of a pair's rail, from the cache where it was made before."""
+    """Return the `section_table` for slices in place of a pair's rail, from the cache if it is there."""
     wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
     lateral = lateral or slices.lateral
     digest = _digest(pair, slices.sheets, slices.s, backwards, *lateral)
@@ -36,7 +38,10 @@ def kept_table(pair, slices, backwards, lateral=None):
 
 
 def kept_shape(pair, shape):
-    """`shape_table`, of a wheel of slices from the cache where it was made before; others take no time."""
+    """Return the `shape_table` of a pair and a shape of its wheel or rail.
+
+    Only tables of wheels described by slices are cached; the others are computed at once.
+    """
     if not isinstance(shape, SlicedWheel):
         return shape_table(pair, shape)
     digest = _digest(pair, shape.slices.sheets, shape.slices.angles, math.nan)
@@ -44,7 +49,7 @@ def kept_shape(pair, shape):
 
 
 def _kept(digest, make):
-    """The table with a digest; `make` makes it where there is none."""
+    """Return the table with a digest from the cache; if it is missing, compute it with ``make`` and store it."""
     path = table_folder() / f"seen_{digest}.npz"
     table = _read(path)
     if table is None:
@@ -61,7 +66,7 @@ def _kept(digest, make):
 
 
 def _read(path):
-    """The `SectionTable` of a file; None where there is none, or its bytes are not those that were written."""
+    """Return the `SectionTable` of a file, or None if the file is missing or damaged."""
     with suppress(OSError):
         content = path.read_bytes()
         arrays, seal = content[:-SEAL], content[-SEAL:]
@@ -74,12 +79,12 @@ def _read(path):
 
 
 def _seal(content):
-    """The SHA-256 of a file's content, which stands behind it: readers of ZIP files pass over it."""
+    """Return the SHA-256 of a file's content. It is appended to the file, where readers of ZIP files ignore it."""
     return hashlib.sha256(content).digest()
 
 
 def _table_of(found):
-    """The `SectionTable` of a file's arrays."""
+    """Return the `SectionTable` built from a file's arrays."""
     parts = {name: found[name] for name in found.files}
     parts = {name: part if part.ndim else part.item() for name, part in parts.items()}
     own = {name: parts.pop(name) for name in TABLE_FIELDS}
@@ -87,7 +92,7 @@ def _table_of(found):
 
 
 def _digest(pair, sheets_of_it, places, *numbers):
-    """Digest of all that a table depends on: a pair, sheets, the places of their slices, and numbers."""
+    """Return a digest of all inputs of a table: a pair, sheets, positions of their slices, and further numbers."""
     digest = hashlib.sha256(f"{FORM}".encode())
     curves = [array for curve in (pair.wheel, pair.rail) for array in (curve.u, curve.f, curve.df, curve.d2f)]
     sheets = [array for sheet in sheets_of_it for array in (sheet.s, sheet.points, (sheet.first, sheet.last))]

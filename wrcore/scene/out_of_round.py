@@ -1,4 +1,4 @@
-"""Wheels out of round, from the keys ``out_of_round`` below a scene's ``wheel``."""
+"""Out-of-round wheels, from the keys ``out_of_round`` below a scene's ``wheel``."""
 
 import json
 
@@ -16,18 +16,22 @@ from wrcore.scene.changing_rails import STEEPEST_ALONG
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01
-"""Deviations above this are taken for a mistake, m."""
+"""Largest accepted deviation from the round wheel, or from the scene's wheel profile, m; it detects wrong units."""
 
 SWING = 0.5
-"""Part of its range by which a spline may leave what was measured; a tenth of it over gaps."""
+"""Accepted overshoot of the spline beyond the measured deviations, as a fraction of their range; a tenth of it if the
+angles have gaps."""
 
 NARROWER = 2e-3
-"""Sections that end so much before the wheel does are told, m."""
+"""Distance before the end of the wheel's profile; wrcore warns if sections end further from it, m."""
 
 
 def read_out_of_round(data, vehicle, pairs, crossings, folder, source):
-    """`OutOfRound` or `SlicedWheel` of each wheel, left and right of wheelset after wheelset, None of a round one, and
-    the angle (rad) that touches at the beginning; empty where all are round. ``pairs`` are the scene's."""
+    """Return (shape, angle) of each wheel, left and right, wheelset after wheelset; empty if all wheels are round.
+
+    The shape is an `OutOfRound` or a `SlicedWheel`, or None for a round wheel; the angle (rad) is the wheel's angle at
+    the contact at the beginning. ``pairs`` are those of the scene.
+    """
     shapes, known = [], {}
     for k, pair in enumerate(pairs):
         side, name = list(SIDES)[k % 2], vehicle.wheelset_names[k // 2]
@@ -51,7 +55,7 @@ def read_out_of_round(data, vehicle, pairs, crossings, folder, source):
 
 
 def _shape(spec, pair, field, folder, source):
-    """Shape of what a scene says of one wheel of a pair."""
+    """Return the shape that ``out_of_round`` of one wheel describes."""
     if "slices" in spec:
         return _sliced(spec, pair, field, folder, source)
     radius = pair.rolling_radius
@@ -72,6 +76,7 @@ def _shape(spec, pair, field, folder, source):
 
 
 def _check_slope(slopes, field, source):
+    """Raise an InputError if a slope of the wheel's surface along the circumference reaches `STEEPEST_ALONG`."""
     slope = np.abs(slopes).max()
     if not slope < STEEPEST_ALONG:
         expected = f"expected a surface that rises less than {STEEPEST_ALONG:g} along the wheel, got {slope:.3g}"
@@ -79,7 +84,7 @@ def _check_slope(slopes, field, source):
 
 
 def _sliced(spec, pair, field, folder, source):
-    """`SlicedWheel` of a file of slices."""
+    """Return the `SlicedWheel` of a file of slices; InputError if it does not fit the scene's wheel profile."""
     others = [name for name in ("flats", "polygon", "table") if spec.get(name)]
     if others:
         raise InputError(source, f"{field}.{others[0]}", "expected nothing beside slices, which are the whole wheel")
@@ -107,12 +112,12 @@ def _sliced(spec, pair, field, folder, source):
         expected = f"expected sections within {LARGEST:g} m of the scene's wheel {wheel.name}, got {off:.3g} m"
         raise InputError(path, "profile", expected)
     _check_slope(rates / pair.rolling_radius, field, source)
-    _check_slope(np.diff(f, axis=0) / (pair.rolling_radius * around[1]), field, source)  # where a turn closes, too
+    _check_slope(np.diff(f, axis=0) / (pair.rolling_radius * around[1]), field, source)  # also where the turn closes
     return shape
 
 
 def _measured(path):
-    """`Measured` of a CSV file."""
+    """Return the `Measured` deviations of a CSV file with the columns angle_rad and deviation_m."""
     file, known = read_column_file(path), ("angle_rad", "deviation_m")
     found = {name: (k, factor) for k, (name, factor) in named_columns(file, known).items()}
     for name in known:

@@ -1,4 +1,4 @@
-"""Profiles of wheels and rails, and which wheel of which wheelset has what where they differ."""
+"""Wheel and rail profiles of a scene, and the `WheelOnRail` of each wheel if wheels or rails differ."""
 
 import math
 import os
@@ -14,7 +14,7 @@ from wrcore.geometry.profiles.files import POINT_FILES
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 
-LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
+LARGEST_WEAR = 0.05  # largest accepted difference of a radius from the vehicle's, m; it detects wrong units
 NAMED_BY = (
     "parameters",
     "profile",
@@ -25,7 +25,10 @@ NAMED_BY = (
 
 
 def find_file(path, folder, source, field):
-    """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
+    """Return the path of a file named in a scene.
+
+    The name is relative to the scene's folder, to the folder above it, or to the working directory, in this order.
+    """
     found = _found(path, folder)
     if found is None:
         raise InputError(source, field, f"expected an existing file, got {path!r}")
@@ -40,8 +43,10 @@ def _found(path, folder):
 
 
 def digests_of_files(value, folder, key=""):
-    """SHA-256 of all files that a scene's content, or a part of it, names, and of profiles that slices name, by their
-    paths."""
+    """Return the SHA-256, by path, of all files that a scene's content or a part of it names.
+
+    Profiles that files of slices name are included.
+    """
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else ((key, item) for item in value)
         return {path: digest for name, item in items for path, digest in digests_of_files(item, folder, name).items()}
@@ -53,7 +58,7 @@ def digests_of_files(value, folder, key=""):
 
 
 def with_names(value, folder, names, key=""):
-    """A scene's content, or a part of it, with other names for the files of `digests_of_files`, by their paths."""
+    """Return a scene's content, or a part of it, with renamed files; ``names`` maps their paths to new names."""
     if isinstance(value, dict):
         return {name: with_names(item, folder, names, name) for name, item in value.items()}
     if isinstance(value, list):
@@ -63,12 +68,12 @@ def with_names(value, folder, names, key=""):
 
 
 def wheel_and_rail(data, folder, source):
-    """The scene's wheel and rail profile, of all wheels that are not said to differ; files count from ``folder``."""
+    """Return the scene's common wheel and rail profile; file names are relative to ``folder``."""
     return tuple(_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))
 
 
 def differing_pairs(data, vehicle, wheel, rail, track, folder, source):
-    """Left and right `WheelOnRail` of each wheelset, from the front; empty where all are ``wheel`` on ``rail``."""
+    """Return left and right `WheelOnRail` of each wheelset from the front; empty if all are ``wheel`` on ``rail``."""
     single = data["wheel"].get("wheelsets", {})
     unknown = sorted(set(single) - set(vehicle.wheelset_names))
     if unknown:
@@ -88,8 +93,10 @@ def differing_pairs(data, vehicle, wheel, rail, track, folder, source):
 
 
 def _rail_of(spec, side, rail, folder, source):
-    """The rail of one side; its inclination is that of both unless it has one of its own, or says that its points lie
-    in the track pose."""
+    """Return the rail profile of one side.
+
+    The common inclination applies unless the side states another one or its points are already inclined.
+    """
     if not spec.get(side):
         return rail
     both = {key: spec[key] for key in ("profile", "inclination") if key in spec}
@@ -100,7 +107,7 @@ def _rail_of(spec, side, rail, folder, source):
 
 
 def _wheel_of(spec, field, pair, folder, source):
-    """A pair with what is said to differ of its wheel."""
+    """Return a pair with the wheel profile and rolling radius that ``spec`` states for its wheel."""
     if not spec:
         return pair
     wheel = _profile(spec, "wheel", field, folder, source) if "profile" in spec else pair.wheel
@@ -112,7 +119,7 @@ def _wheel_of(spec, field, pair, folder, source):
 
 
 def _ratio(value, source, field):
-    """Inclination as a ratio: a number or a fraction such as '1/40'; None where none is given."""
+    """Return an inclination, a number or a fraction such as '1/40', as a number; None stays None."""
     if value is None:
         return None
     ratio = parse_ratio(value)
@@ -124,7 +131,7 @@ def _ratio(value, source, field):
 
 
 def _profile(spec, kind, where, folder, source):
-    """The profile that the mapping under the key ``where`` names; files count from the scene's folder."""
+    """Return the profile that the mapping under the key ``where`` names; files are relative to ``folder``."""
     field, profile = f"{where}.profile", spec["profile"]
     inclination = _ratio(spec.get("inclination"), source, f"{where}.inclination") if kind == "rail" else None
     if isinstance(profile, dict) and isinstance(profile.get("points"), str):
@@ -134,7 +141,7 @@ def _profile(spec, kind, where, folder, source):
     try:
         return named_profile(profile, kind, inclination)
     except InputError as error:
-        if error.source in (kind, "profile"):  # not a fault inside a file: name the scene
+        if error.source in (kind, "profile"):  # the error is in the scene, not in a profile's file
             named = f"{where}.inclination" if error.field == "inclination" else field
             raise InputError(source, named, error.expected) from None
         raise

@@ -1,4 +1,4 @@
-"""Numbers of a scene that may change over time or along the track."""
+"""Numbers of a scene that may vary with time or along the track."""
 
 import numpy as np
 
@@ -6,10 +6,11 @@ from wrcore.errors import InputError
 
 
 def read_schedule(spec, value, abscissas, source, field):
-    """A number, or a table of two lists, ``{abscissa: [...], value: [...]}``, as the number of its abscissa in
-    ``abscissas`` (0 for a number) and points (q, 2), abscissa strictly rising, and value; one point for a number.
+    """Return the abscissa's index in ``abscissas`` and points (q, 2) of a number or a table.
 
-    ``value`` is the key of the values; further keys are left to others. An InputError names ``source`` and ``field``.
+    A table is two lists, ``{abscissa: [...], value: [...]}``. The columns of the points are abscissa, strictly
+    increasing, and value. A number has the index 0 and one point. ``value`` is the key of the values; further keys are
+    ignored. An InputError names ``source`` and ``field``.
     """
     if not isinstance(spec, dict):
         return 0, np.array([[0.0, float(spec)]])

@@ -1,4 +1,4 @@
-"""Scenes that files of results hold, and laws that changes of a scene name."""
+"""Scenes stored in run files; user-defined laws that they name are not run without consent."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,8 +8,10 @@ from wrcore.kernels.named_laws import Laws
 
 
 class StoredScene(dict[str, Any]):
-    """Content of a scene that a run file holds: it may be anybody's, and names no law that is run unasked. Copies, and
-    what is joined with others by ``|``, are such content, too."""
+    """Content of a scene from a run file, whose author may be unknown: laws that it names run only if trusted.
+
+    Copies and unions with ``|`` are of this type, too.
+    """
 
     def copy(self) -> "StoredScene":
         return StoredScene(self)
@@ -22,12 +24,12 @@ class StoredScene(dict[str, Any]):
 
 
 def laws_of_stored(scene: dict[str, Any], trust: bool) -> Laws:
-    """What finds the laws of a run's scene in the working directory; ``trust`` lets those of a run file be run."""
+    """Return the `Laws` that find a run's laws in the working directory; ``trust`` allows laws of a run file."""
     return Laws(Path(), trusted=trust or not isinstance(scene, StoredScene))
 
 
 def texts_in(value: Any) -> Iterable[str]:
-    """All texts in nested data."""
+    """Yield all strings in nested dicts, lists and tuples."""
     if isinstance(value, dict | list | tuple):
         for item in value.values() if isinstance(value, dict) else value:
             yield from texts_in(item)

@@ -1,20 +1,21 @@
-"""The flexible track under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
+"""Flexible track under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
 
 import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.track.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
 
-SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # freedoms of the sleeper
+SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # sleeper freedoms, after those of the rails
 
 
 LEAST_RAIL_MASS = 0.1
-"""Least mass of a rail under a wheel that has one, kg: at 0.001 kg the rounding of contact forces alone accelerates it
-by 1e-5 m/s^2, and no vehicle is found to rest on it (suspended wheelset, springs of 1e8 and 1e12 N/m)."""
+"""Smallest accepted mass of a rail under a wheel, kg, unless it is 0. At 0.001 kg the rounding of contact forces
+accelerates the rail by 1e-5 m/s^2, and no static equilibrium is found (suspended wheelset, springs of 1e8 and
+1e12 N/m)."""
 
 
 def check_support(spec, source):
-    """Raise an InputError where the parts of ``track.support``, checked against the schema, do not go together."""
+    """Raise an InputError if values of ``track.support``, checked against the schema, contradict each other."""
     if spec is None:
         return
     mass = spec["rail"]["mass"]
@@ -32,9 +33,11 @@ def check_support(spec, source):
 
 
 def track_support(spec, half_distance, elements, wheelsets):
-    """What stands under each wheelset, and force elements that count its states among their own. ``half_distance`` is
-    that of the rails from the track's centre line (m), where the halves of the ballast are taken to carry the
-    sleeper."""
+    """Return the `FlexibleTrack` under each wheelset, and the elements with the track's states added to their count.
+
+    ``half_distance`` is the lateral distance of each rail from the track's centre line, m. Each half of the ballast is
+    taken to support the sleeper under one rail.
+    """
     if spec is None:
         return rigid_track(), elements
     rail, sleeper = spec["rail"], spec.get("sleeper")
@@ -54,7 +57,10 @@ def track_support(spec, half_distance, elements, wheelsets):
 
 
 def _add(matrices, spring, stretch, share=1.0):
-    """Add a part of a spring and damper, whose stretch is a sum of freedoms by factors, to K and C."""
+    """Add a spring and damper to the matrices K and C, weighted by ``share``.
+
+    ``stretch`` maps each degree of freedom to its factor in the spring's extension.
+    """
     row = np.zeros(len(matrices[0]))
     row[list(stretch)] = list(stretch.values())
     for matrix, key in zip(matrices, ("stiffness", "damping"), strict=True):

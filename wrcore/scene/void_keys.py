@@ -1,7 +1,7 @@
-"""Keys of a scene that have no effect beside the value of another key.
+"""Keys of a scene that have no effect because of the value of another key (void keys).
 
-A scene or its changes that state such a key are refused. Only where a change makes a key of the scene void, the key is
-left out, and one line says so. A key that has its default value counts as left out.
+A scene or a change that states such a key raises an InputError. If a change makes a key of the scene void, the key is
+left out and a line on stderr names it. A key with its default value is treated as left out.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +17,7 @@ from wrcore.kernels.told import tell
 
 
 class VoidKey(NamedTuple):
-    """A key and what makes it void."""
+    """A key and the condition on another key that makes it void."""
 
     key: str
     by: str
@@ -28,10 +28,10 @@ class VoidKey(NamedTuple):
 
 
 say_once = cache(tell)
-"""Say a line, once in a process."""
+"""Report a line once per process."""
 
 REFERENCES = ("scipy_", "cvode")
-"""Beginnings of the names of methods of other packages."""
+"""Prefixes of the names of integration methods from other packages."""
 
 _STRIPS = "contact.patch", lambda patch: patch not in STRIPS, "which has no strips, unlike exact and tabulated"
 _ELLIPSES = "contact.patch", lambda patch: patch not in REDUCTIONS, "which has creep forces of its own"
@@ -42,7 +42,7 @@ _POLACH = "contact.creep.model", lambda model: model != "polach", "unlike polach
 
 
 def _lacks(*keys):
-    """Whether no segment of a track's path has any of some keys."""
+    """Return a function that tests whether no segment of a track's path has any of the keys."""
     return lambda path: (
         not any(
             isinstance(one, dict) and any(one.get(key) for key in keys)
@@ -75,16 +75,16 @@ VOID_KEYS: tuple[VoidKey, ...] = (
 )
 
 ALL_OTHERS = frozenset(rule.by for rule in VOID_KEYS)
-"""Keys that make others void."""
+"""Keys whose values can make other keys void."""
 
 
 def leave_out_void_keys(
     data: dict[str, Any], source: str, changes: Mapping[str, Any] | None = None, undecided: Iterable[str] = ()
 ) -> None:
-    """Set each key that a change makes void to its default; InputError where a void key is stated otherwise.
+    """Set each key that a change makes void to its default; InputError if the scene or a change states a void key.
 
-    ``data`` is a checked scene with defaults, ``changes`` are values by key path that it already holds. Beside keys
-    that are ``undecided``, such as those of a sweep, no key is void.
+    ``data`` is a checked scene with defaults, ``changes`` are values by key path that it already holds. Keys that are
+    ``undecided``, such as those that a sweep varies, make no key void.
     """
     changes = {key: value for key, value in (changes or {}).items() if value is not None}
     for key, by, is_void, why in VOID_KEYS:
@@ -114,7 +114,7 @@ def _at(data, key):
 
 @cache
 def _defaults():
-    """Defaults of the scene's keys by their paths."""
+    """Return the default values of the scene's keys by key path."""
     tables = (("", "scene"), ("track.", "track"))
     found = {above + key: default for above, name in tables for key, _, _, default, _ in keys_of(name)}
     return found | {"contact.creep.tolerance": DEFAULT_TOLERANCE}
