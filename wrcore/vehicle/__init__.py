@@ -1,1 +1,1 @@
-"""Vehicles from data: bodies, joints and elements."""
+"""Vehicles from vehicle files: bodies, joints and force elements."""

@@ -1,9 +1,9 @@
-"""Values of a vehicle that a scene changes by their key paths, such as ``vehicle.elements.spring_1l.stiffness``.
+"""Changes of vehicle values in a scene by key path, such as ``vehicle.elements.spring_1l.stiffness``.
 
-``bodies``, ``elements`` and ``joints`` are addressed by name or by a pattern (``spring_*``), which means all whose name
-matches and that have the key. A change is another value, ``{factor: 1.2}`` on the numbers that are there, or one of
-three numbers by its place: ``{z: 4.0e+5}``, ``{yaw: ...}`` or ``{2: ...}``. Patterns come before names, each in their
-alphabetical order.
+``bodies``, ``elements`` and ``joints`` are addressed by name or by a pattern (``spring_*``). A pattern addresses all
+parts whose name matches and that have the key. A change is another value, a factor on the present numbers
+(``{factor: 1.2}``), or one of three numbers by its axis or index: ``{z: 4.0e+5}``, ``{yaw: ...}`` or ``{2: ...}``.
+Patterns are applied before names, both in alphabetical order.
 """
 
 import copy
@@ -13,14 +13,17 @@ from wrcore.errors import InputError, check_number, one_of, short
 
 GROUPS = ("bodies", "elements", "joints")
 AXES = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("0", "1", "2")
-"""What a change may call the numbers of a key that holds three."""
+"""Names that a change may use for the three numbers of a list."""
 
 MOST_FACTOR = 1e6
+"""Largest accepted magnitude of a factor."""
 
 
 def changed(data, changes, source):
-    """The content of a checked vehicle file with the changes of a scene (its key ``vehicle``), and the fields that they
-    reach (``elements.NAME``); InputError names ``source`` and the key path.
+    """Return the content of a checked vehicle file with a scene's changes, and the set of changed fields.
+
+    ``changes`` are those of the scene's key ``vehicle``. Fields are named as in ``elements.NAME``. An InputError names
+    ``source`` and the key path.
     """
     data, reached = copy.deepcopy(data), set()
     for group in GROUPS:
@@ -35,7 +38,7 @@ def changed(data, changes, source):
 
 
 def _meant(items, name, key, field, source):
-    """Names of the parts that a name or a pattern means."""
+    """Return the names of the parts that a name or a pattern addresses."""
     if name in items:
         return [name]
     matching = [one for one in items if fnmatchcase(one, name)]
@@ -49,7 +52,7 @@ def _meant(items, name, key, field, source):
 
 
 def _put(value, change, field, source):
-    """A value with a change."""
+    """Return a value after a change: another value, a factor, or changes of single numbers or keys."""
     if not isinstance(change, dict):
         return change
     if set(change) == {"factor"}:

@@ -1,4 +1,4 @@
-"""Vehicles from data: a YAML file becomes bodies, force elements and joints."""
+"""Vehicles from YAML files: bodies, force elements and joints for kernels."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,20 +19,22 @@ from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
 
 GRAVITY = 9.81
-"""m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
+"""Gravitational acceleration, m/s^2; the static wheel loads of Manchester vehicle 1 are based on this value."""
 
 IMPOSSIBLE = 1.01
-"""A principal moment of inertia beyond this part of the sum of the two others is told."""
+"""Ratio of a principal moment of inertia to the sum of the two others above which wrcore warns; 1 is the physical
+limit."""
 
 BODY_KEYS = {
     "wheelset": (("rolling_radius", "tape_circle_half_distance"), ("independent_wheels",)),
     "body": ((), ()),
     "axle_box": (("wheelset",), ()),
 }
-"""Keys of each kind of body beside kind, mass, inertia and position: those it needs and those it may have."""
+"""Required and optional keys of each kind of body, in addition to kind, mass, inertia and position."""
 
 LARGEST_LIFT = 0.02
-"""Wheelsets whose centre lies further than this from its rolling radius above the rails are taken for a mistake, m."""
+"""Largest accepted difference between the height of a wheelset's centre and its rolling radius, m; it detects wrong
+positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +44,20 @@ class Vehicle:
     name: str
     source_file: str
     body_names: tuple
-    """In the order of the state vector."""
+    """Names of the bodies in the order of the state vector."""
     positions: np.ndarray
     """(n, 3): nominal centres of mass, m."""
     rolling_radius: float
+    """Nominal rolling radius of the wheelsets, m; NaN for a vehicle without wheelsets."""
     half_distance: float
-    """Of the wheelsets, m; NaN for a vehicle without wheelsets."""
+    """Half of the distance between the wheelsets' tape circles, m; NaN for a vehicle without wheelsets."""
     bodies: Bodies
     elements: Elements
     joints: Joints
     data: dict
-    """The file's content with defaults, for provenance."""
+    """Content of the vehicle file with defaults, for provenance."""
     unit: "Vehicle | None" = None
-    """The vehicle that a train repeats."""
+    """Single vehicle of a train of equal vehicles, else None."""
     directed: tuple = ()
     """Names of the force elements along one direction, row by row of ``elements.directed``."""
 
@@ -64,9 +67,12 @@ class Vehicle:
         return tuple(self.body_names[b] for b in self.bodies.wheelsets)
 
     def nominal_wheel_load(self, body):
-        """Rough vertical load of a wheel of a wheelset in nominal position, N. All bodies' weight in equal parts where
-        springs carry bodies (without those that joints hold at their height), else the wheelset's own weight less its
-        preloads."""
+        """Estimate the vertical load of a wheel of a wheelset in nominal position, N.
+
+        In a vehicle with further bodies the weight of all bodies is divided equally among the wheels, without bodies
+        that joints hold at their height. For wheelsets only, the load is half of the wheelset's weight less its
+        vertical preloads.
+        """
         if len(self.bodies.mass) > len(self.bodies.wheelsets):
             joints = [(item["kind"], item.get("axis"), item["bodies"][0]) for item in self.data["joints"]]
             held = {body for kind, axis, body in joints if kind == "coordinate" and axis == "z"}
@@ -77,9 +83,12 @@ class Vehicle:
 
 
 def vehicle_of(spec, find, source, laws):
-    """The vehicle of a scene's key ``vehicle``, with its changes (`wrcore.vehicle.changes`): of the file that ``find``
-    finds by its path, or of its content. ``laws`` finds the laws of its elements. An InputError names the file, or the
-    scene (``source``) where that is wrong, the element and what was expected."""
+    """Return the vehicle of a scene's key ``vehicle`` with its changes (`wrcore.vehicle.changes`).
+
+    The key holds the content of a vehicle file or its path, which ``find`` resolves. ``laws`` finds user-defined laws
+    of the elements. An InputError names the element, the expected value, and the vehicle file or, if the error is in
+    the scene, ``source``.
+    """
     parameters = spec["parameters"]
     data, name = parameters, f"{source}: vehicle.parameters"
     if isinstance(parameters, str):
@@ -98,7 +107,7 @@ def vehicle_of(spec, find, source, laws):
 
 
 def _with_laws(data, folder, laws):
-    """The content of a vehicle file, with absolute paths of the files beside it that hold laws of the user."""
+    """Return the content of a vehicle file with absolute paths of files of user-defined laws in the same folder."""
     elements = data.get("elements")
     for item in elements if isinstance(elements, list) else ():
         if isinstance(item, dict) and isinstance(item.get("law"), str):
@@ -107,9 +116,12 @@ def _with_laws(data, folder, laws):
 
 
 def build_vehicle(data, source, axle_boxes=True):
-    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors. Without
-    ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and yaw; in
-    pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset."""
+    """Check and compile the content of a vehicle file, which errors name ``source``.
+
+    Without ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and the box's moments of inertia in
+    roll and yaw. The wheelset's pitch inertia is unchanged, because the box does not turn with it. Force elements of
+    the box act on the wheelset.
+    """
     data = _validated(data, source)
     _check_bodies(data["bodies"], source)
     _check_names(data, source)
@@ -121,7 +133,7 @@ def build_vehicle(data, source, axle_boxes=True):
 
 
 def compile_vehicle(data, source):
-    """Bodies, elements and joints of a checked description."""
+    """Compile a checked vehicle description to bodies, force elements and joints for kernels."""
     layout = _layout(data, source)
     parts = [data["bodies"][name] for name in layout.names]
     wheelsets = np.flatnonzero(layout.spins)
@@ -147,7 +159,7 @@ def compile_vehicle(data, source):
 
 
 def _validated(data, source):
-    """The data checked against the schema; errors name an element or joint instead of its place in the list."""
+    """Return the data checked against the schema; errors name an element or joint instead of its list index."""
     try:
         return validate(data, "vehicle", source)
     except InputError as error:
@@ -163,11 +175,11 @@ RESERVED = {
     "t": "the times of a run", "end": "the end of a run", "energy": "the energies of a run",
     "drive": "motors and brakes of a run", "control": "control laws of a run",
 }  # fmt: skip
-"""Names in runs and their files that no body may have, with what they stand for."""
+"""Names that no body may have, because runs and their files use them, with their meaning there."""
 
 
 def _check_names(data, source):
-    """No two elements, and no two joints, of the same name, and no body of a name that runs have for something else."""
+    """Raise an InputError if two elements or two joints share a name, or if a body has a name in `RESERVED`."""
     for name in sorted(RESERVED.keys() & data["bodies"]):
         raise InputError(source, f"bodies.{name}", f"expected another name, as {name} stands for {RESERVED[name]}")
     for group in ("elements", "joints"):
@@ -178,8 +190,10 @@ def _check_names(data, source):
 
 
 def _check_bodies(bodies, source):
-    """Keys of each kind of body, possible moments of inertia, equal wheelsets, and what a frame that does not spin asks
-    of a wheelset."""
+    """Raise an InputError for wrong keys of bodies, impossible inertia or unequal wheelsets.
+
+    Wheelset frames do not spin, so a wheelset's products of inertia xy and yz must be 0.
+    """
     wheelsets = {name: part for name, part in bodies.items() if part["kind"] == "wheelset"}
     for name, part in bodies.items():
         needed, optional = BODY_KEYS[part["kind"]]
@@ -193,7 +207,7 @@ def _check_bodies(bodies, source):
         if moments[0] <= 0.0:
             expected = f"expected products that leave all principal moments above 0, got one of {moments[0]:.4g} kg m^2"
             raise InputError(source, f"bodies.{name}.inertia", expected)
-        if part["kind"] == "wheelset":  # whose pitch may have a rotor, by the gear ratio squared
+        if part["kind"] == "wheelset":  # its pitch inertia may include a motor's rotor, times the gear ratio squared
             low, high = sorted(part["inertia"][key] for key in ("roll", "yaw"))
             moments = low, part["inertia"]["pitch"], high
         if moments[2] > IMPOSSIBLE * (moments[0] + moments[1]):
@@ -217,7 +231,10 @@ def _check_bodies(bodies, source):
 
 
 def _lumped(bodies):
-    """The bodies with each axle box made part of its wheelset; the boxes keep their places, for elements' names."""
+    """Return the bodies with each axle box lumped into its wheelset.
+
+    The boxes stay in the dict as kind ``lumped``, so that elements can name them.
+    """
     bodies = {name: {**part, "inertia": dict(part["inertia"])} for name, part in bodies.items()}
     for part in bodies.values():
         if part["kind"] == "axle_box":
@@ -232,6 +249,7 @@ def _lumped(bodies):
 
 
 def _layout(data, source):
+    """Return the `Layout` of a checked description; lumped axle boxes are aliases of their wheelsets."""
     parts = {name: part for name, part in data["bodies"].items() if part["kind"] != "lumped"}
     return Layout(
         source, tuple(parts), np.array([part["position"] for part in parts.values()], float),
@@ -242,6 +260,7 @@ def _layout(data, source):
 
 
 def _joints(joints, layout, source):
+    """Check joints and compile them to `Joints`."""
     items = []
     for item in joints:
         field, length = f"joints.{item['name']}", 0.0

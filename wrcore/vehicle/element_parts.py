@@ -1,4 +1,4 @@
-"""What the force elements of a vehicle are made of: checked, and on its bodies."""
+"""Parts of a vehicle's force elements: checked and assigned to bodies."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from wrcore.forces.kinds.own_law import try_law
 
 
 def check_element(item, source):
-    """Raise an InputError that names the element if its kind, its keys or their values are not what they should be."""
+    """Raise an InputError that names the element if its kind, its keys or their values are wrong."""
     field = f"elements.{item['name']}"
     try:
         known = kind_named(item["kind"])
@@ -32,7 +32,7 @@ def check_element(item, source):
 
 
 def try_laws(elements, source):
-    """Call each law of the user of checked ``elements`` for a test; an InputError names the element."""
+    """Test-call each user-defined law of checked ``elements``; an InputError names the element."""
     for item in elements:
         try:
             if item["kind"] == "own_law":
@@ -42,15 +42,18 @@ def try_laws(elements, source):
 
 
 class Part(NamedTuple):
-    """A part of a force element on two bodies."""
+    """A part of a force element between two bodies."""
 
-    name: str  # of the element
+    name: str  # name of the element
     bodies: tuple[int, int]
-    does: Any  # `wrcore.forces.kind.Spring`, `Turning` or `Along`, seen from the first body
+    does: Any  # `wrcore.forces.kind.Spring`, `Turning` or `Along`, which acts on the first body
 
 
 def parts_of(item, layout, load=None):
-    """Parts of a checked element, wheelsets first; ``load`` (N) for kinds whose parts depend on it."""
+    """Return the parts of a checked element; a wheelset is the first of a part's two bodies where forces require it.
+
+    ``load`` (N) is the load on the element, for kinds whose parts depend on it.
+    """
     field, kind = f"elements.{item['name']}", KINDS[item["kind"]]
     first, second = layout.ends(item, field)
     found = []
@@ -68,12 +71,15 @@ def parts_of(item, layout, load=None):
 
 
 def _anywhere(does):
-    """Whether forces need not act at a point of an axle, which does not spin: on a line they go through both ends."""
+    """Whether the part's forces may act at any point of a wheelset, also off its axle.
+
+    Wheelset frames do not spin. Forces on a line between the ends pass through both ends in any case.
+    """
     return does.axis is None if isinstance(does, Along) else isinstance(does, Turning) and does.anywhere
 
 
 def _turned(does):
-    """A part seen from the other body, with the other one's axes: preload and law belong to the opposite motion."""
+    """Return a part with its two bodies exchanged; preload and law change sign accordingly."""
     does = does._replace(ends=does.ends[::-1])
     if isinstance(does, Along):
         points = does.points if does.points is None else -does.points[::-1]
@@ -84,7 +90,10 @@ def _turned(does):
 
 
 def _on_an_axle(turning, item, layout):
-    """Nothing bends in pitch of a wheelset, nor of an axle box that is part of one."""
+    """Return a rotational part without pitch stiffness and damping if it acts on a wheelset or a lumped axle box.
+
+    An InputError is raised if the element states a pitch value other than 0 at a wheelset, which turns in pitch.
+    """
     turns = [name in layout.names and layout.spins[layout.names.index(name)] for name in item["bodies"]]
     if not any(turns) and not any(name in layout.aliases for name in item["bodies"]):
         return turning

@@ -1,4 +1,4 @@
-"""Force elements of a vehicle file: preloaded and sorted for the kernels. Kinds: `wrcore.forces.kinds`."""
+"""Compilation of a vehicle's force elements, with preloads, for kernels. Kinds: `wrcore.forces.kinds`."""
 
 import numpy as np
 
@@ -11,13 +11,15 @@ from wrcore.vehicle.element_parts import parts_of
 from wrcore.vehicle.statics import preloads
 
 PASSES = 8
-"""Most passes of the search for the load on each element whose parts depend on it: they enter its stiffness, and these
-the shares of the load where springs differ."""
+"""Largest number of iterations for the loads on elements whose stiffness depends on their load. The stiffnesses
+determine how springs share the weight, and so the loads."""
 
 
 def compile_elements(items, layout, joints, gravity):
-    """Checked elements sorted into what kernels need, and the names of those along one direction in its order; joints
-    carry weight, too, and ``gravity`` (m/s^2) makes the preloads of elements that state none."""
+    """Return checked elements as `Elements` for kernels, and the names of those along one direction, in their order.
+
+    Preloads that elements do not state follow from the weight with ``gravity`` (m/s^2); joints carry weight, too.
+    """
     springs, directed, turning, waiting = [], [], [], []
     pressing: dict[str, tuple] = {}
     parts, found = _loaded(items, layout, joints, gravity)
@@ -56,8 +58,10 @@ def compile_elements(items, layout, joints, gravity):
 
 
 def _loaded(items, layout, joints, gravity):
-    """All parts, those that depend on their load (N) at the one that they carry, and preloads by name. An InputError
-    names an element that should carry something and does not."""
+    """Return the parts of all elements and the springs' preloads (N) by name.
+
+    Parts that depend on their load are those at the load they carry. An InputError names such an element without load.
+    """
     loads = {item["name"]: first(item) for item in items if (first := KINDS[item["kind"]].first_load)}
     for _ in range(PASSES):
         parts = [part for item in items for part in parts_of(item, layout, loads.get(item["name"]))]
@@ -74,7 +78,10 @@ def _loaded(items, layout, joints, gravity):
 
 
 def _pressed(name, pair, does, pressing, source):
-    """Which element presses, and the numbers of the law."""
+    """Return the position of the element whose force presses a friction element, and the numbers of the friction law.
+
+    The position is None for an element without ``normal``.
+    """
     if does.normal is None:
         return None, does.numbers(0.0) if callable(does.numbers) else does.numbers
     its_pair, place, press = pressing.get(does.normal, (None, None, None))

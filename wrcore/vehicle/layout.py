@@ -1,4 +1,4 @@
-"""Where the bodies of a vehicle stand in its nominal position."""
+"""Nominal positions, masses and names of the bodies of a vehicle."""
 
 from dataclasses import dataclass
 
@@ -12,17 +12,17 @@ FRAME_NAME = "frame"
 
 @dataclass(frozen=True)
 class Layout:
-    """Bodies of a vehicle in nominal position, all with their axes along the track's."""
+    """Bodies of a vehicle in nominal position; all body axes are parallel to the track's."""
 
-    source: str  # named in errors
+    source: str  # file name for errors
     names: tuple
     positions: np.ndarray  # (n, 3): centres of mass, m
     mass: np.ndarray  # (n,), kg
     spins: np.ndarray  # (n,): True for wheelsets, whose frame does not spin with them
-    aliases: dict  # names of bodies that are part of another one
+    aliases: dict  # names of axle boxes that are lumped into a wheelset, with the wheelset's name
 
     def ends(self, item, field):
-        """Body numbers of the two ends of an element or joint; the moving frame can only be the second one."""
+        """Return the body numbers of the two ends of an element or joint; only the second may be the moving frame."""
         numbers = []
         known = (*self.names, *self.aliases)
         for name in item["bodies"]:
@@ -38,7 +38,10 @@ class Layout:
         return numbers
 
     def marker(self, point, body, field):
-        """A point in the axes of a body. Wheelset frames do not spin: their markers must lie on the axle."""
+        """Return a point relative to a body's centre of mass, m.
+
+        Wheelset frames do not spin: points on a wheelset must lie on the axle.
+        """
         if body == FRAME:
             return np.array(point, float)
         marker = np.array(point, float) - self.positions[body]
@@ -49,6 +52,9 @@ class Layout:
         return marker
 
     def rest(self, marker, first, second, offset):
-        """Nominal position of a marker of the first body relative to the second one, m."""
+        """Return the nominal position of a marker of the first body relative to the second body's centre of mass, m.
+
+        For the moving frame it is relative to the frame's origin, shifted by ``offset`` along the track.
+        """
         point = self.positions[first] + marker
         return point - (np.array([offset, 0.0, 0.0]) if second == FRAME else self.positions[second])

@@ -1,14 +1,14 @@
-"""Which springs carry a vehicle in its nominal position, and with which preloads.
+"""Preloads of the springs that carry a vehicle in its nominal position.
 
-Wheelsets stand on the rails and the moving frame stays where it is; every other body may move by a small q, a
-translation and a rotation. With B the motion of an element's two ends relative to each other per unit of q, K the sum
-of B^T k B over the springs' vertical stiffnesses k and C q = 0 the joints, the vehicle's weight f sinks it by
+Wheelsets and the moving frame are fixed; every other body may move by a small q, a translation and a rotation. B is the
+relative motion of an element's two ends per unit of q. K is the sum of B^T k B over the springs' vertical stiffnesses
+k, and C q = 0 are the joints. The displacement under the vehicle's weight f follows from
 
     [ K  C^T ] [ q      ]   [ f ]
     [ C   0  ] [ lambda ] = [ 0 ],
 
-and each spring's share of the load is its preload, -k B q. In nominal position nothing then accelerates, and horizontal
-springs, traction rods and bump stops are free of load.
+and each spring's preload is -k B q. With these preloads the vehicle is in equilibrium in nominal position, and
+horizontal springs, traction rods and bump stops carry no load.
 """
 
 import numpy as np
@@ -18,14 +18,17 @@ from wrcore.errors import InputError
 from wrcore.forces.kind import Along, Spring, Turning
 
 UNCARRIED = 1e-6
-"""Part of a body's weight that nothing may be left to carry."""
+"""Largest force or moment (N, N m) without support that is accepted, as a fraction of the body's weight."""
 
 
-@np.errstate(all="ignore")  # numbers that overflow carry nothing
+@np.errstate(all="ignore")  # overflow makes the check of the supported weight fail
 def preloads(parts, layout, joints, gravity):
-    """Vertical preloads (N on the first body, by name) of the springs among the elements' ``parts`` that state none,
-    such that the vehicle rests in nominal position. They share what the elements with a stated preload leave over, as
-    linear springs would; ``gravity`` in m/s^2. An InputError names a body that neither springs nor joints carry."""
+    """Return the vertical preloads (N on the first body, by name) of springs among ``parts`` that state no preload.
+
+    With them the vehicle is at rest in nominal position. Stated preloads carry part of the weight; these springs share
+    the remainder in proportion to their stiffness in a linear equilibrium. ``gravity`` is in m/s^2. An InputError names
+    a body that neither springs nor joints carry.
+    """
     size = 6 * len(layout.names)
     weight, load = np.zeros(size), np.zeros(size)
     weight[2::6] = -gravity * layout.mass
@@ -54,7 +57,7 @@ def preloads(parts, layout, joints, gravity):
 
 
 def _solve(stiffness, constraints, load, fixed):
-    """Displacements under a load, and the load that nothing carries, with some of the unknowns held at zero."""
+    """Return the displacements under a load and the unsupported part of the load; ``fixed`` unknowns are 0."""
     n, scale = len(load), max(np.max(np.abs(stiffness)), 1.0)
     columns = np.flatnonzero(~fixed)
     rows = constraints[:, columns] * scale
@@ -73,7 +76,7 @@ def _solve(stiffness, constraints, load, fixed):
 
 
 def _point_motion(body, point, layout):
-    """Motion (6, size) of a point of a body: translation and rotation per unit of all unknowns."""
+    """Return the motion (6, size) of a point of a body: its translation and rotation per unit of all unknowns."""
     motion = np.zeros((6, 6 * len(layout.names)))
     if body != FRAME:
         x, y, z = np.asarray(point) - layout.positions[body]
@@ -84,8 +87,10 @@ def _point_motion(body, point, layout):
 
 
 def _stiffness(does):
-    """Stiffness (6, 6) of a part against relative translation and rotation, and its stated preload (N on the first
-    body) or None."""
+    """Return the stiffness (6, 6) of a part against relative translation and rotation, and its preload.
+
+    The preload (3,) is the stated force on the first body, N, or None.
+    """
     stiffness = np.zeros((6, 6))
     if isinstance(does, Along):
         here, there = does.ends
@@ -100,7 +105,7 @@ def _stiffness(does):
 
 
 def _constraints(item, layout):
-    """Rows (m, size) of a joint: what it does not let move, in nominal position."""
+    """Return the constraint rows (m, size) of a joint in nominal position: each row times the unknowns is 0."""
     first, second = layout.ends(item, f"joints.{item['name']}")
     if item["kind"] == "coordinate":
         return _point_motion(first, layout.positions[first], layout)[["xyz".index(item["axis"])]]

@@ -1,4 +1,4 @@
-"""Trains: one vehicle several times, one behind the other."""
+"""Trains of several equal vehicles, one behind the other."""
 
 from dataclasses import replace
 
@@ -11,11 +11,12 @@ from wrcore.vehicle.layout import FRAME_NAME
 
 
 def train_of(vehicle, count, spacing, source):
-    """Several equal vehicles, each ``spacing`` (m) behind the one before, not coupled to one another; what acts between
-    one and the moving frame does so for each.
+    """Return a train of ``count`` equal vehicles, each ``spacing`` (m) behind the preceding vehicle.
 
-    The vehicle itself for one; else the names of bodies, elements and joints begin with ``vehicle_1_`` (the leading
-    one), ``vehicle_2_``, and so on. InputError without a spacing, or for one in which vehicles overlap.
+    The vehicles are not coupled to each other; elements and joints to the moving frame are repeated for each vehicle.
+    For a count of 1 the vehicle itself is returned. Else the names of bodies, elements and joints begin with
+    ``vehicle_1_`` (the leading vehicle), ``vehicle_2_``, and so on. An InputError is raised if there is no spacing or
+    if vehicles overlap.
     """
     if count == 1:
         return vehicle
@@ -31,7 +32,7 @@ def train_of(vehicle, count, spacing, source):
 
 
 def repeated(data, count, spacing):
-    """The content of a vehicle file, checked and with defaults, for a train of vehicles ``spacing`` (m) apart."""
+    """Return the content of a checked vehicle file, repeated for ``count`` vehicles at a ``spacing`` (m)."""
     train = {**data, "bodies": {}, "elements": [], "joints": []}
     for k in range(count):
         prefix, shift = f"vehicle_{k + 1}_", -k * spacing
@@ -53,7 +54,7 @@ def repeated(data, count, spacing):
 
 
 def repeated_equilibrium(equilibrium, train):
-    """Static equilibrium of a train from that of one of its vehicles, ``train.unit``."""
+    """Return the static equilibrium of a train from the equilibrium of its single vehicle ``train.unit``."""
     bodies = len(train.unit.body_names)
     count = len(train.body_names) // bodies
     end = STATE_SIZE * bodies
@@ -64,7 +65,7 @@ def repeated_equilibrium(equilibrium, train):
 
 
 def _moved(at, shift):
-    """A point, or a list of points, moved along the track."""
+    """Return a point, or a list of points, shifted along the track by ``shift`` (m)."""
     if isinstance(at[0], list):
         return [_moved(point, shift) for point in at]
     return [at[0] + shift, *at[1:]]
