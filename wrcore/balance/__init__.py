@@ -1,1 +1,1 @@
-"""Where a vehicle stands and how it begins: static equilibrium, steady running, the state at the start."""
+"""Static equilibrium, steady running and initial state of a vehicle."""

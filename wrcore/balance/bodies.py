@@ -1,4 +1,4 @@
-"""Where a scene puts single bodies at the start, and how fast."""
+"""Initial positions and velocities of single bodies, from a scene's key ``initial.bodies``."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import centreline, frame_turn
 
 PLACES, ANGLES, RATES = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("vx", "vy", "vz", "wx", "wy", "wz")
-"""Keys of a body, named like the channels of runs."""
+"""Keys of a body in ``initial.bodies``: positions (m), angles (rad), velocities (m/s, rad/s), named like channels."""
 
 BOX = "pitch", "wy"
-"""Keys of an axle box: its motions that the revolute joint to the axle of its wheelset leaves free."""
+"""Keys of an axle box: the motions that the revolute joint to its wheelset's axle allows."""
 
 
 def check_bodies(bodies, vehicle, source):
-    """Raise an InputError that names the body if ``initial.bodies`` asks for what a vehicle does not have."""
+    """Raise an InputError that names the body if ``initial.bodies`` has bodies or keys that the vehicle lacks."""
     for name, values in bodies.items():
         field = f"initial.bodies.{name}"
         if name not in vehicle.body_names:
@@ -29,9 +29,12 @@ def check_bodies(bodies, vehicle, source):
 
 
 def put_bodies(bodies, vehicle, state, path):
-    """Write what a scene says of its bodies into a state on a tangent track, in place; all else stays. ``bodies`` has
-    values by name of the body and key, as channels have them (:mod:`wrcore.run.output.channels`): m, rad, m/s and
-    rad/s, relative to the axes of the track, which turn as they go along the path with the body."""
+    """Write the values of ``initial.bodies`` into a state on a tangent track, in place; other values are unchanged.
+
+    ``bodies`` has values by name of the body and key: m, rad, m/s and rad/s as in channels
+    (:mod:`wrcore.run.output.channels`). They are relative to the track axes at the body, which move along the path with
+    the body and turn with the path.
+    """
     boxes = {name: values for name, values in bodies.items() if vehicle.data["bodies"][name]["kind"] == "axle_box"}
     for name, values in bodies.items():
         if name in boxes:
@@ -47,18 +50,18 @@ def put_bodies(bodies, vehicle, state, path):
         for i, key in enumerate(RATES[1:], start=1):
             part[VELOCITY + i] = values[key] - part[VELOCITY] * carried[i] if key in values else part[VELOCITY + i]
         _carry_boxes(name, vehicle, state)
-    for name, values in boxes.items():  # once all wheelsets are in their places
+    for name, values in boxes.items():  # after all wheelsets have their positions
         _turn_box(name, values, vehicle, state, path)
 
 
 def _carried(path, part):
-    """Velocity and angular velocity (6,) that the axes of the track give a body there, per m/s along the path."""
+    """Return velocity and angular velocity (6,) of a body fixed to the moving track axes, per m/s along the path."""
     turn = np.array(frame_turn(centreline(path, part[0])))
     return np.concatenate([np.cross(turn, [0.0, part[1], part[2]]), turn])
 
 
 def _carry_boxes(wheelset, vehicle, state):
-    """Let the axle boxes of a wheelset go along with its axle, without turning about it."""
+    """Move the axle boxes of a wheelset with its axle, without rotation about the axle; ``state`` is changed."""
     parts = dict(zip(vehicle.body_names, state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, 13), strict=True))
     places, axle = dict(zip(vehicle.body_names, vehicle.positions, strict=True)), parts[wheelset]
     axes = matrix_of(axle[EULER:VELOCITY])
@@ -71,8 +74,7 @@ def _carry_boxes(wheelset, vehicle, state):
 
 
 def _turn_box(name, values, vehicle, state, path):
-    """Turn an axle box about the axle of its wheelset until its pitch and its angular velocity about y are those of
-    the scene."""
+    """Set pitch (rad) and angular velocity about y (rad/s) of an axle box by rotation about its wheelset's axle."""
     parts = dict(zip(vehicle.body_names, state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, 13), strict=True))
     box, axle = parts[name], parts[vehicle.data["bodies"][name]["wheelset"]]
     roll, _, yaw = angles(axle[EULER:VELOCITY])

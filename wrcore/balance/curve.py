@@ -1,16 +1,18 @@
-"""Steady running in a constant curve: what stays the same in axes that go round with the vehicle.
+"""Steady running in a constant curve: a motion that is constant in axes which rotate with the vehicle.
 
-The path is one circle without end (or, without curvature, a straight line with cant). In its balance the vehicle turns
-about the circle's centre like a rigid body, and its wheelsets spin as well. Unknown are the places of all bodies, the
-spins and the force elements' internal states. The residual is what accelerations and internal states' rates are left
-beside those of the turn. Nothing drives a vehicle: creep slows it down in a curve, all its velocities in proportion.
-This common acceleration is an unknown, too, unless elements lead to the moving frame, which then pulls.
+The path is an infinite circle (or, without curvature, a straight line with cant). In steady running (the balance) the
+vehicle rotates about the circle's centre like a rigid body, and its wheelsets spin. The unknowns are the positions of
+all bodies, the spins and the force elements' internal states. The residual is the difference of accelerations and
+internal states' rates from those of the rotation. A vehicle has no drive here: creep decelerates it in a curve, all its
+velocities in proportion. This common acceleration is an unknown, too, unless elements are connected to the moving
+frame, which then pulls the vehicle.
 
-Balances are found one from another, by Broyden's method: slopes are taken by differences once, learn from each step and
-stay, from one curve to the next, until they mislead (C. G. Broyden, Math. Comp. 19 (1965) 577-593).
+Each balance is computed from the preceding one by Broyden's method. The Jacobian is computed once by differences,
+updated in each step and kept from one curve to the next, until a step reduces the residual too little (C. G. Broyden,
+Math. Comp. 19 (1965) 577-593).
 
-States here are those of a tangent track: places, rotations and spins in the axes of the track where a body is, x its
-arc length. :func:`on_circle` lays them along the curve.
+States here are those of a tangent track: positions, rotations and spins in the track axes at the body, x its arc
+length. :func:`on_circle` transforms them to the curve.
 """
 
 from dataclasses import dataclass
@@ -31,27 +33,29 @@ from wrcore.kernels.handles import Handle
 from wrcore.track.track import TrackModel
 
 STEP, SPIN_STEP, SLOWING_STEP = 1e-7, 1e-6, 1e-3
-"""Of the difference quotients in places (m, rad), spins (rad/s) and the common acceleration (m/s^2)."""
+"""Steps of the difference quotients in positions (m, rad), spins (rad/s) and the common acceleration (m/s^2)."""
 
 MOST_STEPS, HALVINGS = 40, 12
-"""Steps towards one balance, and how often one by fresh slopes is halved."""
+"""Largest number of steps for one balance, and of trial lengths of a step with a new Jacobian, each half of the
+preceding."""
 
 MISLED = 0.5
-"""A step that leaves more than this part of what was left asks for fresh slopes."""
+"""If a step reduces the residual to more than this fraction of its value, a new Jacobian is computed."""
 
 LAST_STEP, LAST_LEFT = 1e-7, 1e-6
-"""Where a step shorter than the one (m, rad, rad/s, m/s^2) leaves less than the other (m/s^2, rad/s^2), Broyden's
-method ends."""
+"""Bounds of the last step (m, rad, rad/s, m/s^2) and the last residual (m/s^2, rad/s^2); Broyden's method ends when
+both are below them."""
 
 LEAST_PART = 2.0**-8
-"""Part of the way between two curves below which the way is not divided any more."""
+"""Smallest part of the difference between two curves that is used as one continuation step."""
 
 FAR, STRAIGHT = np.array([1e-3, 0.1, 0.01, 10.0]), 0.1
-"""Differences of curves that count alike, of each number; a way turns by less than this where it goes straight on."""
+"""Scales of differences between curves (1/m, m, m, m/s), and the largest relative change of direction between two
+continuation steps at which the preceding move is extrapolated."""
 
 
 class Curve(NamedTuple):
-    """A curve without end, and the speed in it."""
+    """A curve of infinite length and the speed of the vehicle."""
 
     curvature: float  # 1/m, positive to the left
     cant: float  # m over `CANT_BASE`, right rail higher
@@ -59,7 +63,7 @@ class Curve(NamedTuple):
     speed: float  # m/s
 
     def towards(self, other, part):
-        """The curve a part of the way to another one."""
+        """Return the curve between this one (``part`` = 0) and another one (``part`` = 1), by linear interpolation."""
         return Curve(*((1.0 - part) * a + part * b for a, b in zip(self, other, strict=True)))
 
 
@@ -69,27 +73,27 @@ class CurveBalance:
 
     curve: Curve
     state: np.ndarray
-    """As on a tangent track; see :func:`on_circle`."""
+    """State in the coordinates of a tangent track; see :func:`on_circle`."""
     acceleration: float
-    """Common one of all velocities, along the track, m/s^2: negative where creep slows the vehicle down."""
+    """Common acceleration of all velocities along the track, m/s^2; negative if creep decelerates the vehicle."""
     residual: float
-    """Largest acceleration or rate left (m/s^2, rad/s^2, m/s)."""
+    """Largest residual of accelerations and rates (m/s^2, rad/s^2, m/s)."""
     patches: np.ndarray
-    """(k, 2, MAX_PATCHES, PATCH_COLUMNS): of the wheelsets' left and right wheels, NaN where absent."""
+    """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of the wheelsets' left and right wheels, NaN where absent."""
     way: np.ndarray
-    """(4,): from the curve whose balance it was found from, in units of ``FAR``."""
+    """(4,): difference from the curve of the preceding balance, in units of ``FAR``."""
     moves: np.ndarray
-    """(unknowns,): from that balance."""
+    """(unknowns,): change of the unknowns from the preceding balance."""
 
 
 def straight_balance(model, state):
-    """Static equilibrium as the balance of straight track."""
+    """Return a static equilibrium ``state`` as the `CurveBalance` of straight track."""
     straight, nothing = Curve(0.0, 0.0, 0.0, float(model.speed)), np.zeros(0)
     return CurveBalance(straight, state, 0.0, 0.0, nothing, np.zeros(4), nothing)
 
 
 def on_circle(model, curve, states):
-    """States (k, size) that turn about the curve's centre at its speed, from those as on a tangent track."""
+    """Return states (k, size) that rotate about the curve's centre at its speed, from states on a tangent track."""
     n, out = len(model.bodies.mass), states.copy()
     parts = out[:, : STATE_SIZE * n].reshape(len(states), n, STATE_SIZE)
     roll, bend, speed = -np.arcsin(curve.cant / CANT_BASE), curve.curvature, curve.speed
@@ -107,7 +111,7 @@ def on_circle(model, curve, states):
 
 
 def _turn(parts, angle, axis):
-    """Turn rotations and angular velocities of bodies (..., 13) about an axis, in place."""
+    """Rotate the attitudes and angular velocities of bodies (..., 13) about an axis by ``angle`` (rad), in place."""
     c, s, i, j = np.cos(0.5 * angle), np.sin(0.5 * angle), (axis + 1) % 3, (axis + 2) % 3
     p, w = parts[..., EULER:VELOCITY].copy(), parts[..., OMEGA:].copy()
     parts[..., EULER] = c * p[..., 0] - s * p[..., 1 + axis]
@@ -119,28 +123,30 @@ def _turn(parts, angle, axis):
 
 
 class Slopes(NamedTuple):
-    """How what is left changes with the unknowns."""
+    """Jacobian of the residual with respect to the unknowns, inverted and scaled."""
 
-    inverse: np.ndarray  # (unknowns, rows): the step towards the balance, per what is left
-    weights: np.ndarray  # (rows,): by these, each row's largest slope is 1
-    scales: np.ndarray  # (unknowns,): square of the largest slope in each unknown, by the weights
+    inverse: np.ndarray  # (unknowns, rows): pseudo-inverse of the Jacobian
+    weights: np.ndarray  # (rows,): factors with which each row's largest derivative is 1
+    scales: np.ndarray  # (unknowns,): square of the largest weighted derivative with respect to each unknown
 
     def size(self, left):
-        """Of what is left, by the weights."""
+        """Return the maximum norm of a residual ``left`` (rows,), weighted."""
         return np.max(np.abs(self.weights * left))
 
     def learned(self, step, change):
-        """With Broyden's update: the least one by which a step makes the change that it made."""
+        """Return the slopes after Broyden's update: the smallest change of the Jacobian that maps step to change."""
         along = (self.scales * step) @ self.inverse
         return self._replace(inverse=self.inverse + np.outer(step - self.inverse @ change, along) / (along @ change))
 
 
 class Turning:
-    """A model on curves without end, perfect ones, and what it has learned of its slopes there; ``aside`` is that of
-    `wrcore.geometry.path.PathData`."""
+    """Solver for steady running of a model on infinite curves without irregularity; it keeps its Jacobian.
+
+    ``aside`` is that of `wrcore.geometry.path.PathData`.
+    """
 
     def __init__(self, model, aside=0.0):
-        self.row = np.zeros((1, COLUMNS))  # where the equations read of the curve
+        self.row = np.zeros((1, COLUMNS))  # the equations read the curve from this row
         self.row[0, X + 1] = 1.0
         path = PathData(self.row, np.array([-np.inf]), np.zeros(1, np.int64), 0.0, 1.0, aside)
         track = TrackModel(False, path, no_irregularity())
@@ -155,7 +161,7 @@ class Turning:
             self.steps = self.steps[:-1]  # the frame pulls
 
     def enter(self, curve):
-        """Go over to a curve."""
+        """Set curve and speed of the equations; scale the Jacobian's spin columns with the speed."""
         row = self.row[0]
         row[CURVATURE], row[ROLL], row[WIDENING] = curve.curvature, -curve.cant / CANT_BASE, curve.widening
         kernel, handle, work = self.equations.arguments
@@ -169,14 +175,17 @@ class Turning:
                 self.slopes = self.slopes._replace(inverse=inverse, scales=scales)
 
     def moved(self, state, acceleration, moves):
-        """States (k, size) and accelerations (k,) after moves (k, unknowns)."""
+        """Return states (k, size) and accelerations (k,) after changes ``moves`` (k, unknowns) of the unknowns."""
         rows = np.zeros((len(moves), 12 * len(self.model.bodies.mass) + internal_states(self.model)))
         rows[:, self.columns] = moves[:, : len(self.columns)]
         slowed = moves[:, -1] if len(self.steps) > len(self.columns) else 0.0
         return moved_states(self.model, state, rows), acceleration + slowed * np.ones(len(moves))
 
     def left(self, states, accelerations):
-        """Accelerations and internal states' rates (k, 6 n + states) beside those of a steady turn that slows down."""
+        """Return the residual (k, 6 n + states): accelerations and internal states' rates less those of the rotation.
+
+        The rotation about the curve's centre has the common acceleration ``accelerations`` (k,), m/s^2.
+        """
         n, bodies = len(self.model.bodies.mass), self.model.bodies
         turning = on_circle(self.model, self.curve, states)
         self.equations.work.arc_lengths[:] = states[0, STATE_SIZE * bodies.wheelsets]
@@ -193,7 +202,10 @@ class Turning:
         return np.hstack([left.reshape(len(states), -1), inner])
 
     def _begin(self, known, curve, straight_on):
-        """Way and moves from a balance to where the next one is sought, and state and acceleration there."""
+        """Return the starting point for the next balance: way, moves, state (size,) and acceleration (m/s^2).
+
+        Way and moves are the differences from the ``known`` balance; with ``straight_on`` its moves are extrapolated.
+        """
         way, moves = np.subtract(curve, known.curve) / FAR, np.zeros(len(self.steps))
         ratio = (way @ known.way) / (known.way @ known.way)
         if straight_on and ratio > 0.0 and np.linalg.norm(way - ratio * known.way) < STRAIGHT * np.linalg.norm(way):
@@ -205,8 +217,10 @@ class Turning:
         return way, moves, states[0], accelerations[0]
 
     def balance(self, known, curve, straight_on):
-        """`CurveBalance` of a curve, sought from that of another one, or from where the way to that one leads
-        ``straight_on``."""
+        """Return the `CurveBalance` of a curve, iterated from the ``known`` balance of another curve.
+
+        With ``straight_on`` the iteration starts from an extrapolation of the last change.
+        """
         way, moves, state, acceleration = self._begin(known, curve, straight_on)
         self.enter(curve)
         left = self.left(state[None], np.array([acceleration]))[0]
@@ -214,7 +228,7 @@ class Turning:
             fresh = self.slopes is None
             try:
                 slopes = self._fresh_slopes(state, acceleration, left) if fresh else self.slopes
-            except np.linalg.LinAlgError:  # it has gone astray, where nothing is finite
+            except np.linalg.LinAlgError:  # the iteration has diverged to values that are not finite
                 left = np.full_like(left, np.inf)
                 break
             step, size, part = -slopes.inverse @ left, slopes.size(left), 2.0
@@ -227,7 +241,7 @@ class Turning:
             else:
                 self.slopes = None
                 if fresh:
-                    self.left(state[None], np.array([acceleration]))  # leaves the patches of this state
+                    self.left(state[None], np.array([acceleration]))  # fills the patches of this state
                     break
                 continue
             misled = slopes.size(new) > MISLED * size
@@ -241,20 +255,22 @@ class Turning:
         return CurveBalance(curve, state, float(acceleration), residual, patches, way, moves)
 
     def _fresh_slopes(self, state, acceleration, left):
-        """`Slopes` by differences in all unknowns."""
+        """Return `Slopes` computed by differences in all unknowns."""
         moved = self.left(*self.moved(state, acceleration, np.diag(self.steps)))
         slopes = ((moved - left) / self.steps[:, None]).T
         largest = np.max(np.abs(slopes), axis=1)
-        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # rows of zeros have no force
         slopes *= weights[:, None]
         return Slopes(np.linalg.pinv(slopes, RANK * 1e-2) * weights, weights, np.max(np.abs(slopes), axis=0) ** 2)
 
 
-@np.errstate(all="ignore")  # what overflows is no balance
+@np.errstate(all="ignore")  # an overflow is no balance
 def solve_curve(turning, known, curve, limit):
-    """The `CurveBalance` of a curve, from that of another: directly, or by way of curves between both, as near to each
-    other as it takes. A ``residual`` above the limit (m/s^2) means that none was found; it is then of the last curve
-    tried."""
+    """Return the `CurveBalance` of a curve, from the ``known`` balance of another curve.
+
+    It is solved directly or through intermediate curves, whose distance is halved until the iteration converges. A
+    ``residual`` above the limit (m/s^2) means that no balance was found; the result is then the last curve tried.
+    """
     reached, part, straight_on, before = 0.0, 1.0, True, known
     while reached < 1.0:
         target = known.curve.towards(curve, min(reached + part, 1.0))

@@ -1,9 +1,9 @@
-"""Static equilibrium: the vehicle rolls straight on at constant speed and nothing accelerates.
+"""Static equilibrium: the vehicle rolls straight ahead at constant speed and all accelerations are zero.
 
-Unknown are small displacements of all bodies (three translations, three rotations in track axes) but for a wheelset's
-rotation about its axle, which its frame does not have, and the force elements' internal states. Newton's method on the
-accelerations, without a wheelset's about its axle; directions in which nothing holds a body (along the track, say) stay
-as they are.
+The unknowns are small displacements of all bodies (three translations, three rotations in track axes) and the force
+elements' internal states. A wheelset's rotation about its axle is no unknown, as its frame does not spin. Newton's
+method solves for zero accelerations, without those of wheelsets about their axles. Displacements without stiffness,
+such as those along the track, are not changed.
 """
 
 from dataclasses import dataclass
@@ -21,34 +21,37 @@ from wrcore.geometry.path import tangent_path
 from wrcore.wheels.modes import WARM
 
 STEP = 1e-7
-"""Of the difference quotients: m and rad."""
+"""Step of the difference quotients, m and rad."""
 
 RESIDUAL = 1e-9
-"""Accelerations below this count as none, m/s^2 and rad/s^2; Newton's method ends there once a step leaves more than a
-tenth of what was left before it: what is soft still moves far, in y and roll, while they are all but zero."""
+"""Accelerations below this are taken as zero, m/s^2 and rad/s^2. Newton's method continues below it as long as a step
+reduces the residual to less than a tenth, because soft motions in y and roll still change much at small residuals."""
 
 
 NEAR, NOTHING_LEFT = 0.02, 0.01
-"""Of an equilibrium at a step of a force: how far the next one lies by the slopes, m and rad, and the part of the
-residual that it leaves."""
+"""Bounds for an equilibrium at a step of a force: length of the predicted Newton step, m and rad, and fraction of the
+residual that the linear prediction does not remove."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Vehicle at rest relative to the moving frame."""
+    """Static equilibrium of a vehicle: at rest relative to the moving frame."""
 
     state: np.ndarray
     wheel_loads: np.ndarray
     """(k, 2): vertical force of the rails on left and right wheels, N: wheelsets as in ``model.bodies.wheelsets``."""
     residual: float
-    """Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle."""
+    """Largest remaining acceleration, m/s^2 or rad/s^2, without those of wheelsets about their axles."""
     at_a_step: bool = False
-    """Whether forces step there, if something is left: by their slopes a move by less than `NEAR` would mend it."""
+    """Whether a residual comes from a step of a force: the linear prediction removes it within a move of `NEAR`."""
 
 
 def displaced(state, model, displacements):
-    """States (k, size) with displaced bodies: a row of ``displacements`` (k, 6 n + states) has each body's translation
-    (m) and rotation vector (rad) in track axes, then changes of the elements' internal states (m)."""
+    """Return states (k, size) with displaced bodies.
+
+    A row of ``displacements`` (k, 6 n + states) has each body's translation (m) and rotation vector (rad) in track
+    axes, then changes of the elements' internal states (m).
+    """
     n = len(model.bodies.mass)
     states = np.tile(state, (len(displacements), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
@@ -60,7 +63,7 @@ def displaced(state, model, displacements):
 
 
 def _turned(p, turn):
-    """Euler parameters (..., 4) after a further rotation by a rotation vector (..., 3) in track axes."""
+    """Return Euler parameters (..., 4) after a further rotation by a rotation vector (..., 3) in track axes."""
     angle = np.linalg.norm(turn, axis=-1)
     scale = 0.5 * np.sinc(0.5 * angle / np.pi)
     a0, (a1, a2, a3), (e0, e1, e2, e3) = np.cos(0.5 * angle), scale * np.moveaxis(turn, -1, 0), np.moveaxis(p, -1, 0)
@@ -72,24 +75,26 @@ def _turned(p, turn):
 
 
 def _unknowns(model):
-    """Mask (6 n + states,) of the displacements that are unknown: all but a wheelset's rotation about its axle."""
+    """Return the mask (6 n + states,) of unknown displacements: all except wheelsets' rotations about their axles."""
     unknown = np.ones(6 * len(model.bodies.mass) + internal_states(model), bool)
     unknown[6 * np.flatnonzero(model.bodies.spins) + 4] = False
     return unknown
 
 
 def _accelerations(rates, model):
-    """Rows of accelerations, six per body, and rates of the elements' internal states, from rows of state rates."""
+    """Return rows of accelerations, six per body, and rates of elements' internal states, from rows of state rates."""
     n = len(model.bodies.mass)
     bodies = rates[:, : STATE_SIZE * n].reshape(len(rates), n, STATE_SIZE)[:, :, VELOCITY:].reshape(len(rates), 6 * n)
     return np.hstack([bodies, rates[:, STATE_SIZE * n :]])
 
 
 def solve_equilibrium(model, state, iterations=50):
-    """Equilibrium on a tangent track by Newton's method from a nearby state, in which all bodies move ahead at the
-    frame's speed, wheels about to touch the rails or pressed onto them; a large ``residual`` means that none was
-    found."""
-    model = model._replace(beta=model.beta or 1.0)  # without feedback a joint's violation would not show
+    """Solve for the `Equilibrium` on a tangent track by Newton's method from a nearby state.
+
+    In that state all bodies move ahead at the frame's speed, and the wheels nearly touch the rails or are pressed onto
+    them. A large ``residual`` means that no equilibrium was found.
+    """
+    model = model._replace(beta=model.beta or 1.0)  # without feedback a violated joint has no residual
     equations = Equations(model)
     unknown = _unknowns(model)
     size = int(unknown.sum())
@@ -104,7 +109,7 @@ def solve_equilibrium(model, state, iterations=50):
         before = residual
         slopes = ((values[:size] - values[size:-1]) / (2.0 * STEP)).T
         largest = np.max(np.abs(slopes), axis=1)
-        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # rows of zeros have no force
         step = np.zeros(len(unknown))
         step[unknown] = np.linalg.lstsq(weights[:, None] * slopes, -weights * values[-1], rcond=1e-11)[0]
         left = np.max(np.abs(values[-1] + slopes @ step[unknown]))
@@ -117,7 +122,7 @@ def solve_equilibrium(model, state, iterations=50):
 
 
 def _improved(state, step, model, equations, residual):
-    """The state after the longest of the step, its half, its quarter, ... that comes closer to equilibrium, or None."""
+    """Return the state after the longest of step, half, quarter, ... that reduces the residual; None if none does."""
     for halvings in range(12):
         new = displaced(state, model, step[None, :] * 0.5**halvings)[0]
         rates = equations.at(0.0, new[None, :], WARM)
@@ -127,7 +132,7 @@ def _improved(state, step, model, equations, residual):
 
 
 def wheel_loads(equations, state):
-    """Vertical force of the rails on each wheel, N, shape (k, 2)."""
+    """Return the vertical force of the rails on each wheel, N, shape (k, 2): left and right."""
     equations(0.0, state)
     rows = equations.work.patches
     cosine, sine = np.cos(rows[..., reduction.ANGLE]), np.sin(rows[..., reduction.ANGLE])
@@ -136,9 +141,11 @@ def wheel_loads(equations, state):
 
 
 def stand_on_rails(model, state, loads):
-    """Move, lift and roll wheelsets that stand where rails are out of line, until their wheels carry their loads again.
-    They stand in ``state``, changed in place, as on perfect rails; the path is taken as straight. Of ``loads`` (k, 2;
-    left and right, N) each wheelset's mean is what both of its wheels get."""
+    """Move, lift and roll wheelsets on irregular rails until their wheels carry their loads, in place.
+
+    In the given ``state`` the wheelsets stand as on perfect rails; the path is taken as straight. Both wheels of a
+    wheelset get the mean of its ``loads`` (k, 2; left and right, N).
+    """
     joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
     bare = frictionless(model)._replace(elements=pack_elements(), joints=joints, track=track)
     equations, base, deviations = Equations(bare), model.contact.geometry.rail_distance, np.zeros((3, 4))
@@ -152,14 +159,14 @@ def stand_on_rails(model, state, loads):
 
 
 def _lift(state, at, lifts, base):
-    """Lift the axle of a wheelset over the left and over the right rail, m."""
+    """Lift the axle of a wheelset over the left and the right rail by ``lifts`` (2,), m, in place."""
     state[at + 2] += 0.5 * (lifts[0] + lifts[1])
     euler, turn = slice(at + EULER, at + VELOCITY), np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0])
     state[euler] = _turned(state[euler], turn)
 
 
 def _loads_when_lifted(equations, state, at, k, base, lifts):
-    """Loads (N) of the k-th wheelset's wheels at rest, shape (2,), with its ends lifted by ``lifts`` (m)."""
+    """Return the loads (2,) of the k-th wheelset's wheels at rest, N, with its ends lifted by ``lifts`` (2,), m."""
     lifted = state.copy()
     _lift(lifted, at, lifts, base)
     lifted[at + VELOCITY : at + STATE_SIZE] = 0.0
@@ -167,7 +174,10 @@ def _loads_when_lifted(equations, state, at, k, base, lifts):
 
 
 def _lifts_for(carried, load, lifts):
-    """Lifts of both ends at which both wheels carry the load: Newton's method, lowering a wheel that hangs first."""
+    """Return lifts (2,) of both ends, m, at which both wheels carry the load: Newton's method.
+
+    A wheel without contact is lowered first, by 0.1 mm at a time.
+    """
     for _ in range(100):
         missing = load - carried(lifts)
         if np.max(np.abs(missing)) < 1e-6 * load:

@@ -1,9 +1,9 @@
-"""Where a vehicle begins: in steady running on the rails, moved as the scene says.
+"""Initial state of a vehicle: steady running on the rails, displaced as the scene's key ``initial`` states.
 
-Static equilibrium comes first, without friction: it depends neither on speed nor on creep. From there a vehicle that
-is not moved goes on to steady running with all contact forces, spin's lateral force among them. One that is moved is in
-no lateral equilibrium; its wheelsets take the height, the roll and the rolling rate at which no contact force
-accelerates them vertically, in roll or about their axles.
+Static equilibrium without friction is solved first; it depends neither on speed nor on creep. If the vehicle is not
+displaced, steady running with all contact forces, including the lateral force of spin, is solved from there. A
+displaced vehicle is in no lateral equilibrium; its wheelsets get the height, roll and rolling rate at which they do not
+accelerate vertically, in roll or about their axles.
 """
 
 import dataclasses
@@ -32,33 +32,37 @@ from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
 LARGEST_RESIDUAL = 1e-6 * GRAVITY
-"""A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
+"""Largest accepted acceleration at a computed equilibrium, m/s^2 or rad/s^2."""
 
 LARGEST_RESIDUAL_ON_STRIPS = 0.02 * GRAVITY
-"""The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
+"""Largest accepted acceleration for patches on strips, m/s^2 or rad/s^2: forces step by up to 1 % if the number of
+strips changes, and the equilibrium may lie at a step."""
 
 LARGEST_RESIDUAL_AT_A_STEP = 0.1 * GRAVITY
-"""The same where wheels or rails differ, as worn ones do, and a force steps at the only places of rest: with `moment`
-by 10 to 20 % where overlaps merge."""
+"""Largest accepted acceleration for unequal (worn) wheels or rails if a force steps at all equilibria, m/s^2 or
+rad/s^2: with `moment` forces step by 10 to 20 % where overlaps merge."""
 
 LARGEST_SLIP, LARGEST_SHIFT = 0.01, 5e-3
-"""Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
+"""Bounds for accepted steady running: relative difference of rolling rates from pure rolling, and lateral distance of
+wheelsets from static equilibrium, m."""
 
 START_OFFSETS = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
-"""Where wheels or rails differ, equilibrium is sought from these places, too, m: they need not rest in the middle, and
-between worn profiles little tells where."""
+"""Further lateral starting positions of the search for equilibrium, m, if wheels or rails differ: then the equilibrium
+may be off the centre, and worn profiles give little indication where."""
 
 ROUNDING = 1e-9
 """Accelerations of wheelsets below this may be rounding, m/s^2 or rad/s^2."""
 
 EQUILIBRIUM_SPEED = 20.0
-"""Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
+"""Speed at which equilibria are solved, m/s; only the velocities in them depend on it."""
 
 
-@np.errstate(all="ignore")  # what overflows is no equilibrium
+@np.errstate(all="ignore")  # an overflow is no equilibrium
 def equilibrium_positions(scene, model):
-    """Where the bodies of a scene's vehicle stand in static equilibrium, moving along together without rotation; speed
-    and friction do not matter for it. An InputError if there is none near the nominal position."""
+    """Solve for the static `Equilibrium` of a scene's vehicle; all bodies move ahead without rotation.
+
+    It does not depend on speed or friction. An InputError is raised if there is none near the nominal position.
+    """
     vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
     if unit is not None:
@@ -74,7 +78,7 @@ def equilibrium_positions(scene, model):
             equilibrium = solve_equilibrium(level, _standing(scene, model, offset))
         except np.linalg.LinAlgError as error:
             faults.append(InputError(scene.source, "vehicle", f"{expected} none: {error}"))
-        except InputError as error:  # no place for its wheels there
+        except InputError as error:  # its wheels do not fit on the rails there
             faults.append(error)
         else:
             if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
@@ -96,7 +100,7 @@ def equilibrium_positions(scene, model):
 
 
 def _standing(scene, model, offset):
-    """State of the bodies at their nominal places, moved to the left by an offset (m), wheels on their rails."""
+    """Return the state of the bodies at their nominal positions, shifted left by ``offset`` (m), wheels on rails."""
     vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
     sides, state = _geometries(model), np.zeros(state_size(model))
     for body, (x, y, z) in enumerate(vehicle.positions):
@@ -115,12 +119,11 @@ def _standing(scene, model, offset):
 
 
 def static_equilibrium(scene, model, at_rest=None):
-    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
-    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is its
-    `equilibrium_positions`.
+    """Return the static `Equilibrium` of a scene's vehicle on a tangent track without irregularity and friction.
 
-    Its state is one of the model without its drive (:func:`wrcore.forces.drive.undriven`). An InputError if there is
-    none near the nominal position.
+    All bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is the result of
+    `equilibrium_positions`. The state belongs to the model without its drive (:func:`wrcore.forces.drive.undriven`). An
+    InputError is raised if there is no equilibrium near the nominal position.
     """
     at_rest = at_rest or equilibrium_positions(scene, model)
     state = _moving(model, at_rest)
@@ -130,19 +133,23 @@ def static_equilibrium(scene, model, at_rest=None):
 
 
 def _unit(vehicle, model):
-    """The vehicle that a train has several times, where its own stands for all: all have wheels and track alike."""
+    """Return the single vehicle of a train if its equilibrium holds for all, because wheels and track are equal; else
+    None."""
     return None if model.contact.geometries or len(model.flexible_track.mass) else vehicle.unit
 
 
 def _moving(model, at_rest):
-    """State of the bodies at rest with the speed of the moving frame."""
+    """Return the state of an equilibrium with all bodies at the speed of the moving frame."""
     state = at_rest.state.copy()
     state[VELOCITY : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] = model.speed
     return state
 
 
 def _roll_as_it_stands(scene, model, k, sides, state):
-    """Let the k-th wheelset roll without slip in its pose in the state, independent wheels each by itself."""
+    """Set the spin with which the k-th wheelset rolls without slip at its position and attitude, in place.
+
+    Independent wheels get individual speeds.
+    """
     body = model.bodies.wheelsets[k]
     part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
     roll, _, yaw = angles(part[EULER:VELOCITY])
@@ -156,7 +163,7 @@ def _roll_as_it_stands(scene, model, k, sides, state):
 
 
 def _geometries(model):
-    """Handles of the `ContactGeometry` of the left and the right wheel of each wheelset."""
+    """Return handles of the `ContactGeometry` of the left and the right wheel of each wheelset."""
     contact, count = model.contact, len(model.bodies.wheelsets)
     geometries = contact.geometries or (contact.geometry,) * (2 * count)
     handles = {number: Handle(one) for number, one in {id(one): one for one in geometries}.items()}
@@ -164,7 +171,7 @@ def _geometries(model):
 
 
 def _radii(scene, model, k, sides, state, roll, yaw):
-    """Rolling radii (m) of the left and the right wheel's patches, for the k-th wheelset in its place in a state."""
+    """Return the rolling radii (m) of the left and the right wheel's patches of the k-th wheelset in a state."""
     y, z = state[STATE_SIZE * model.bodies.wheelsets[k] :][1:3]
     axle, rows = axle_direction(roll, yaw), np.empty((reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
     spatial, reduced, radii = scene.detection != "planar", min(model.contact.reduction, reduction.MOMENT), []
@@ -176,9 +183,11 @@ def _radii(scene, model, k, sides, state, roll, yaw):
 
 
 def _settled(scene, model, k, sides, y, yaw, load, state, blamed="initial"):
-    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest; the
-    ``sides`` are its `_geometries`. Rails of a flexible track are where the state has them. Where there is no such
-    position, an InputError names the key that is ``blamed``."""
+    """Return roll (rad) and height (m) at which each wheel of the k-th wheelset carries the load (N).
+
+    The contact damping factor is that of zero speed. ``sides`` are the wheelset's `_geometries`. Rails of a flexible
+    track are at their positions in the state. If there is no such position, an InputError names the key ``blamed``.
+    """
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal = scene.detection != "planar", scene.vehicle.rolling_radius
@@ -197,7 +206,8 @@ def _settled(scene, model, k, sides, y, yaw, load, state, blamed="initial"):
 
 
 def _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state):
-    """Let the k-th wheelset stand on the rails at a place (m, rad) with its loads `at_rest`, and roll as it stands."""
+    """Place the k-th wheelset on the rails at y (m) and yaw (rad) with its loads in ``at_rest``, rolling without slip,
+    in place."""
     body, load = model.bodies.wheelsets[k], float(0.5 * at_rest.wheel_loads[k].sum())
     roll, z = _settled(scene, model, k, sides, y, yaw, load, state)
     state[STATE_SIZE * body + 1 : STATE_SIZE * body + VELOCITY] = y, z, *euler_parameters(roll, 0.0, yaw)
@@ -205,13 +215,13 @@ def _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state):
 
 
 def initial_state(scene, model, at_rest=None, shared=None):
-    """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
+    """Return the initial state: steady running, shifted laterally by ``initial.y``, wheelsets yawed by ``initial.yaw``.
 
-    Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
-    rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
-    ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's
-    `equilibrium_positions`; ``shared`` keeps equations of motion for the next scene
-    (`wrcore.equations.many_models.equations_of`)."""
+    Motors and brakes do not act in this steady running; the speed controller's integral is zero. On irregular rails
+    the wheelsets have their static loads, and axle boxes stay on their axles. Values of ``initial.bodies`` are set last
+    and are not changed again. ``at_rest`` is the same vehicle's `equilibrium_positions`; ``shared`` caches equations of
+    motion for the next scene (`wrcore.equations.many_models.equations_of`).
+    """
     vehicle, data = scene.vehicle, scene.data
     at_rest, driven = at_rest or equilibrium_positions(scene, model), model
     model = undriven(model)
@@ -247,7 +257,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
 
 
 def _move(scene, model, moved, at_rest, state):
-    """Put bodies where the scene wants them; wheelsets that are moved stand on the rails, and all still roll."""
+    """Set the values of ``initial.bodies`` in a state, in place; displaced wheelsets are placed on the rails."""
     for (k, body), sides in zip(enumerate(scene.vehicle.bodies.wheelsets), _geometries(model), strict=True):
         part, values = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
         if values.keys() & {"y", "yaw"}:
@@ -258,12 +268,12 @@ def _move(scene, model, moved, at_rest, state):
 
 
 def _parts(vehicle, state):
-    """The bodies' parts of states (..., size), as views, shape (..., n, 13)."""
+    """Return the bodies' parts of states (..., size) as views, shape (..., n, 13)."""
     return state[..., : STATE_SIZE * len(vehicle.body_names)].reshape(*state.shape[:-1], -1, STATE_SIZE)
 
 
 def _with_axle_boxes(vehicle, state):
-    """The state with axle boxes on their axles, pitched against these as they were."""
+    """Return the state with axle boxes placed on their axles; their pitch angles are kept."""
     state = state.copy()
     parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
     places = dict(zip(parts, vehicle.positions, strict=True))
@@ -278,8 +288,10 @@ def _with_axle_boxes(vehicle, state):
 
 
 def _steady(vehicle, model, state):
-    """Steady running near a state; the state itself where there is none (no creep force, say). The vehicles of a train
-    do not act on each other: the first one's is that of all."""
+    """Return the state of steady running near a state, or the given state if there is none, as without creep forces.
+
+    The vehicles of a train do not act on each other: the result of the first vehicle is repeated for all.
+    """
     unit = _unit(vehicle, model)
     if unit is not None:
         bodies, inner = STATE_SIZE * len(unit.body_names), STATE_SIZE * len(vehicle.body_names)
@@ -297,10 +309,12 @@ def _steady(vehicle, model, state):
     return found if near else state
 
 
-@np.errstate(all="ignore")  # what overflows is no better
+@np.errstate(all="ignore")  # an overflow is no improvement
 def _balanced(vehicle, model, equations, state):
-    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates. Newton's
-    method for all wheelsets at once: as long as the other bodies stay, none of them acts on another."""
+    """Return the state with all wheelsets at heights, rolls and rolling rates whose accelerations are zero.
+
+    Newton's method solves for all wheelsets at once: with the other bodies fixed, wheelsets do not act on each other.
+    """
     wheelsets = model.bodies.wheelsets
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
@@ -309,7 +323,7 @@ def _balanced(vehicle, model, equations, state):
     stands = np.column_stack([parts[:, 2], rolls, rolling])
 
     def standing(stands):
-        """States with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
+        """Return states with wheelsets at heights (m), rolls (rad), rolling rates (rad/s), and accelerations."""
         new = np.tile(state, (len(stands), 1))
         parts = _parts(vehicle, new)
         z, roll, rate = (stands[..., i] for i in range(3))
@@ -322,7 +336,7 @@ def _balanced(vehicle, model, equations, state):
         about = np.sum(rates[..., OMEGA:] * axles, axis=-1)
         return new, np.concatenate([rates[..., 9:11], about[..., None]], axis=-1)
 
-    for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
+    for unknown in (3, 2):  # without friction no rolling rate is in balance: it is not changed
         found, balanced = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
         if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
@@ -330,9 +344,11 @@ def _balanced(vehicle, model, equations, state):
 
 
 def _improved(standing, stands, steps):
-    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve, and
-    the state there. Slopes serve again for as long as a step leaves less than a tenth; what is left below ``ROUNDING``
-    is rounding."""
+    """Return the ``stands`` after Newton's method in the first unknowns, and the state there.
+
+    There are as many unknowns as difference ``steps``. Iteration ends at the first step that does not reduce the
+    residual, or below ``ROUNDING``. The Jacobian is kept while a step reduces the residual to a tenth or less.
+    """
     unknown, slopes = slice(len(steps)), None
     states, left = standing(stands[None])
     left = left[0, :, unknown]
@@ -360,8 +376,10 @@ def _improved(standing, stands, steps):
 
 
 def _on_path(path, s, speed, part):
-    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here. The path's
-    axes at the body move along it with a speed, m/s."""
+    """Return the state of one body on the path from its state on a tangent track along x.
+
+    The body is at arc length s (m) of the path; the path's axes at the body move along the path with ``speed``, m/s.
+    """
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)
     turn = frame @ np.array(frame_turn(station)) * speed

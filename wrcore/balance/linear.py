@@ -1,13 +1,13 @@
 """Small motions about steady running: the equations of motion, linearised in independent coordinates.
 
 Coordinates of a body are the displacement of its centre (track axes) and the small rotation of its frame about its own
-axes; with them go the velocity of its centre (track axes) and its angular velocity (body axes). Displacements q and
+axes. The velocities are that of its centre (track axes) and its angular velocity (body axes). Displacements q and
 velocities u are then related by q' = u, and only accelerations and the rates of the elements' internal states need
 difference quotients. The frame of a wheelset does not spin (see wrcore.bodies.body): a wheelset has no rotation about
-its axle, and its spin rate is a velocity alone.
+its axle, and its spin rate is a velocity without a displacement.
 
-Joints are eliminated: with the columns of N a basis of the null space of their Jacobian D, q = N a and u = N b obey all
-of them to first order, whatever the wheelsets' spin.
+Joints are eliminated: the columns of N are a basis of the null space of their Jacobian D. Then q = N a and u = N b
+satisfy all joints to first order, for any spin of the wheelsets.
 """
 
 from dataclasses import dataclass
@@ -24,41 +24,45 @@ DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""
 
 STEP = 1e-7
-"""Of the difference quotients in displacements (m) and rotations (rad)."""
+"""Step of the difference quotients in displacements (m) and rotations (rad)."""
 
 VELOCITY_STEP = 1e-5
-"""Of the difference quotients in velocities (m/s) and angular velocities (rad/s)."""
+"""Step of the difference quotients in velocities (m/s) and angular velocities (rad/s)."""
 
 RANK = 1e-9
-"""Singular values below this part of the largest one count as zero."""
+"""Singular values below this fraction of the largest one are taken as zero."""
 
 
 @dataclass(frozen=True)
 class Linearisation:
-    """x' = A x for small motions about a steady state."""
+    """Linear equations x' = A x for small motions about a steady state."""
 
     matrix: np.ndarray
     """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' internal states."""
     basis: np.ndarray
-    """(12 n + states, m): turns independent coordinates into the moves of the n bodies, see :func:`moved_states`."""
+    """(12 n + states, m): matrix from independent coordinates to the moves of the n bodies, see :func:`moved_states`.
+    """
     state: np.ndarray
     speed: float
-    """m/s."""
+    """Speed of the vehicle, m/s."""
     places: int
     """Number of independent displacements."""
     residual: np.ndarray
-    """(m,): what should be zero at a steady state: x' there, without the velocities (m/s^2, rad/s^2, m/s)."""
+    """(m,): x' at ``state`` without the velocities, zero at a steady state (m/s^2, rad/s^2, m/s)."""
     steps: np.ndarray
-    """(m,): of difference quotients in the independent coordinates."""
+    """(m,): steps of difference quotients in the independent coordinates."""
 
 
 def linearise(model, state):
-    """Linearise the equations of motion about a steady state on a tangent track, in which all bodies run ahead without
-    turning (wheelsets spin) and without acceleration, as in :func:`steady_running`: central differences in all
-    independent coordinates, all right-hand sides in one compiled call."""
+    """Linearise the equations of motion about a steady state on a tangent track.
+
+    In that state all bodies move ahead without rotation (wheelsets spin) and without acceleration, as in
+    :func:`steady_running`. Derivatives are central differences in all independent coordinates; all right-hand sides are
+    evaluated in one compiled call.
+    """
     size = 6 * len(model.bodies.mass)
     equations = Equations(model)
-    equations(0.0, state)  # leaves the joints' Jacobian
+    equations(0.0, state)  # fills the joints' Jacobian
     places, speeds = _independent_motions(model, state, equations.work)
     basis = _block_diagonal(places, speeds, np.eye(internal_states(model)))
     steps = np.full(basis.shape[1], STEP)
@@ -75,8 +79,10 @@ def linearise(model, state):
 
 
 def _block_diagonal(*blocks):
-    """Return the matrix with these matrices along its diagonal. ``scipy.linalg`` has it, too; its import takes 0.05 s,
-    which each run would wait."""
+    """Return the block-diagonal matrix of the given matrices.
+
+    It replaces ``scipy.linalg.block_diag``, whose import would add 0.05 s to each run.
+    """
     ends = np.cumsum([block.shape for block in blocks], axis=0)
     whole = np.zeros(ends[-1])
     for block, (row, column) in zip(blocks, ends, strict=True):
@@ -85,11 +91,13 @@ def _block_diagonal(*blocks):
 
 
 def steady_running(model, state, iterations=10):
-    """Linearise about the steady state near a given one: Newton's method on the displacements and the wheelsets' spins,
-    on a tangent track, from bodies that run ahead at the model's speed, wheels pressed onto the rails.
+    """Solve for the steady state near a given state and linearise about it, on a tangent track.
 
-    Check ``residual``. A free wheelset keeps some: nothing drives it, and its spin creepage slows it down. A
-    displacement that nothing resists, such as that along the track, stays as it is.
+    Newton's method solves for the displacements and the wheelsets' spins. In the given state all bodies move ahead at
+    the model's speed, wheels pressed onto the rails.
+
+    Check ``residual``: the residual of a free wheelset is not zero, because spin creepage decelerates it. Displacements
+    without stiffness, such as those along the track, are not changed.
     """
     best = linearise(model, cleared(model, state))
     places, size = best.places, len(best.matrix)
@@ -102,12 +110,12 @@ def steady_running(model, state, iterations=10):
         last = left
         slopes = best.matrix[places:, columns]
         largest = np.max(np.abs(slopes), axis=1)
-        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # rows of zeros have no force
         step = np.linalg.lstsq(weights[:, None] * slopes, -weights * best.residual[places:], rcond=RANK)[0]
         moved = moved_states(model, best.state, (best.basis[:, columns] @ step)[None, :])[0]
         new = linearise(model, cleared(model, moved))
         before, after = (np.max(np.abs(linear.residual)) for linear in (best, new))
-        # by weights, too: a wheel's spin that grows may hide rails that come to rest
+        # also compared with weights: an increasing spin residual may hide decreasing residuals of the rails
         weighted, less = (np.max(weights * np.abs(linear.residual[places:])) for linear in (best, new))
         if not (after < before or less < 0.5 * weighted):
             break
@@ -116,15 +124,21 @@ def steady_running(model, state, iterations=10):
 
 
 def cleared(model, state):
-    """The state; for patches on strips without what is below the rounding of a balance (1e-13): single precision in
-    rolling contact would make millinewtons of it, between wheels that are mirror images."""
+    """Return the state; for patches on strips, values below 1e-13 (rounding) are set to zero.
+
+    Otherwise single precision in rolling contact would turn them into force differences of millinewtons between wheels
+    that are mirror images.
+    """
     return np.where(np.abs(state) < 1e-13, 0.0, state) if model.contact.strips.strips else state
 
 
 def moved_states(model, state, moves):
-    """States (k, size) with displaced bodies and changed velocities. A row of ``moves`` (k, 12 n + states):
-    displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s, track
-    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' internal states."""
+    """Return states (k, size) with displaced bodies and changed velocities.
+
+    A row of ``moves`` (k, 12 n + states): displacement (m, track axes) and rotation vector (rad, body axes) of body
+    after body; change of velocity (m/s, track axes) and of angular velocity (rad/s, body axes) of body after body;
+    changes of the elements' internal states.
+    """
     n = len(model.bodies.mass)
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
@@ -139,7 +153,7 @@ def moved_states(model, state, moves):
 
 
 def _turned(p, turn):
-    """Euler parameters (..., 4) after a further rotation by a rotation vector in body axes (..., 3)."""
+    """Return Euler parameters (..., 4) after a further rotation by a rotation vector in body axes (..., 3)."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     c, s = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * turn
     e0, e = p[..., :1], p[..., 1:]
@@ -147,22 +161,23 @@ def _turned(p, turn):
 
 
 def _cross(a, b):
-    """Cross products of vectors (..., 3), bit by bit those of NumPy, which is slow where they are few."""
+    """Return cross products of vectors (..., 3), bitwise identical to NumPy's and faster for few vectors."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
 def _out_of_body(p, vector):
-    """Vectors (..., 3) in track axes from vectors in body axes, by Euler parameters (..., 4)."""
+    """Transform vectors (..., 3) from body axes to track axes with Euler parameters (..., 4)."""
     e0, e = p[..., :1], p[..., 1:]
     return vector + 2.0 * _cross(e, _cross(e, vector) + e0 * vector)
 
 
 def _into_body(p, vector):
+    """Transform vectors (..., 3) from track axes to body axes with Euler parameters (..., 4)."""
     return _out_of_body(p * np.array([1.0, -1.0, -1.0, -1.0]), vector)
 
 
 def accelerations(model, states, rates):
-    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
+    """Return the rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
     n = len(model.bodies.mass)
     parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))
     turning, change = (_into_body(parts[..., EULER:VELOCITY], rows[..., OMEGA:]) for rows in (parts, slopes))
@@ -173,7 +188,7 @@ def accelerations(model, states, rates):
 
 
 def _independent_motions(model, state, work):
-    """Displacements (6 n, a) and velocities (6 n, b) that the joints leave free; without joints, of single bodies."""
+    """Return bases of the displacements (6 n, a) and velocities (6 n, b) that satisfy the joints to first order."""
     n = len(model.bodies.mass)
     spins = 6 * np.flatnonzero(model.bodies.spins) + 4
     turning = np.delete(np.arange(6 * n), spins)
