@@ -1,1 +1,1 @@
-"""Where the surfaces are: profiles, track, wheel and rail surfaces."""
+"""Geometry of wheels, rails and track: profiles, changing rails, path, irregularity."""

@@ -1,6 +1,6 @@
-"""Wheels out of round: flats, polygons and measured deviations of a wheel's radius over its angle.
+"""Out-of-round wheels: flats, polygons and measured deviations of a wheel's radius over its angle.
 
-The deviation is the same over the wheel's width. Angles count as in
+The deviation is constant over the wheel's width. Angles are defined in
 `wrcore.geometry.changing_rails.slices.WheelSlices`."""
 
 import math
@@ -12,13 +12,15 @@ import numpy as np
 from wrcore.geometry.changing_rails.slices import TURN
 
 FLAT_MARGIN = 0.01
-"""Length beside a flat over which a wheel sees it yet, m: more than half a window of
+"""Length beyond either end of a flat at which it still affects the contact section, m: more than half a window of
 `wrcore.contact.changing_rails.sections`."""
 
 
 def whole_turn(step, pad, low=0.0):
-    """First angle (rad), step and number of nodes all round, a ``step`` (rad) apart at most, from ``low`` and ``pad``
-    before it on, to ``pad`` behind it."""
+    """Return first angle (rad), step (rad) and number of nodes of a whole turn from ``low`` (rad) on.
+
+    The nodes are at most a ``step`` (rad) apart; ``pad`` nodes are added at either end.
+    """
     count = math.ceil(TURN / step)
     step = TURN / count
     return low - pad * step, step, count + 2 * pad + 1
@@ -26,18 +28,21 @@ def whole_turn(step, pad, low=0.0):
 
 @dataclass(frozen=True)
 class Flat:
-    """A flat: without a depth a fresh one, a chord of the wheel's circle; with one its ends are rounded."""
+    """A wheel flat: without a depth a fresh flat, a chord of the wheel's circle; with a depth its ends are rounded."""
 
     length: float
     depth: float | None = None  # m
     at: float = 0.0  # angle of its middle, rad
 
     def half_angle(self, radius):
-        """Half of the angle (rad) that it takes of a wheel with a radius (m)."""
+        """Return half of the flat's angle (rad) on a wheel with a radius (m)."""
         return math.asin(0.5 * self.length / radius)
 
     def deviation(self, angles, radius):
-        """What a wheel's radius (m) is longer at angles (rad), m: of a rounded flat -d/2 (1 + cos(2 pi x/L))."""
+        """Return the deviation of the wheel's radius at angles (rad), m; for a rounded flat -d/2 (1 + cos(2 pi x/L)).
+
+        ``radius`` is that of the round wheel, m.
+        """
         half, angle = self.half_angle(radius), np.remainder(angles - self.at + math.pi, TURN) - math.pi
         inside = np.clip(angle, -half, half)
         if self.depth is None:
@@ -47,27 +52,27 @@ class Flat:
 
 @dataclass(frozen=True)
 class Wave:
-    """A wave of a polygonal wheel; one of the order 1 is an eccentricity."""
+    """A wave of a polygonal wheel; a wave of order 1 is an eccentricity."""
 
     order: int
     amplitude: float  # m
     phase: float = 0.0  # angle of a crest, rad
 
     def deviation(self, angles, radius):
-        """As that of a `Flat`."""
+        """Return the deviation of the wheel's radius at angles (rad), m; ``radius`` has no effect."""
         return self.amplitude * np.cos(self.order * (angles - self.phase))
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A periodic spline through deviations (m) at angles (rad) that increase, within a turn."""
+    """A periodic spline through measured deviations (m) at increasing angles (rad) within a turn."""
 
     angles: np.ndarray
     deviations: np.ndarray
 
     @property
     def order(self):
-        """Of the shortest wave that it resolves well."""
+        """Order of the shortest well-resolved wave."""
         return 0.125 * self.angles.size
 
     @cached_property
@@ -78,33 +83,36 @@ class Measured:
         return CubicSpline(*once, bc_type="periodic")
 
     def deviation(self, angles, radius):
-        """As that of a `Flat`."""
+        """Return the deviation of the wheel's radius at angles (rad), m; ``radius`` has no effect."""
         return self._spline(angles)
 
 
 @dataclass(frozen=True, eq=False)
 class OutOfRound:
-    """The shape of a wheel: its circle, and deviations from it that add up."""
+    """The shape of a wheel: a circle and the sum of deviations from it."""
 
     radius: float  # at the tape circle, m
     flats: tuple
     waves: tuple = ()
-    """Each a `Wave` or `Measured`."""
+    """Deviations, each a `Wave` or `Measured`."""
     level = True
-    """Whether patches stay level under it."""
+    """Whether contact patches stay level under this wheel."""
 
     def deviation(self, angles):
-        """What its radius is longer at angles (rad) than that of the circle, m."""
+        """Return the difference of the wheel's radius from that of its circle at angles (rad), m."""
         return sum(part.deviation(angles, self.radius) for part in (*self.flats, *self.waves))
 
     @property
     def shortest(self):
-        """Length (m) of its shortest flat or wave."""
+        """Length of the shortest flat or wave, m."""
         return min([flat.length for flat in self.flats] + [TURN * self.radius / wave.order for wave in self.waves])
 
     def nodes(self, step, pad):
-        """First angle (rad), step and number of nodes, a ``step`` (m) apart at most, half of it where only flats are
-        not round: all of it, and ``pad`` more at either end."""
+        """Return first angle (rad), step (rad) and number of nodes that cover all deviations.
+
+        The nodes are at most a ``step`` (m) apart, half a step if there are only flats; ``pad`` nodes are added at
+        either end.
+        """
         step *= (1.0 if self.waves else 0.5) / self.radius
         reaches = [flat.half_angle(self.radius) + FLAT_MARGIN / self.radius for flat in self.flats]
         low = min((flat.at - reach for flat, reach in zip(self.flats, reaches, strict=True)), default=0.0)
@@ -115,10 +123,12 @@ class OutOfRound:
         return low - pad * step, step, count + 2 * pad + 1
 
     def reach(self, radii, turned, x):
-        """How much further down than circles of radii (m,) it reaches at stations (n,) ahead of its axle, (n, m), m,
-        ``turned`` forward by an angle (rad)."""
+        """Return the depth (n, m), m, by which the wheel reaches below circles of the given ``radii`` (m,), m.
+
+        ``x`` (n,) are distances ahead of the axle, m; ``turned`` is the wheel's forward rotation, rad.
+        """
         x = x[:, None]
         long = radii + np.zeros_like(x)
-        for _ in range(4):  # each step leaves a hundredth at most of the one before
+        for _ in range(4):  # each iteration reduces the error at least a hundredfold
             long = radii + self.deviation(turned + np.arcsin(x / long))
         return np.sqrt(long**2 - x**2) - np.sqrt(radii**2 - x**2)

@@ -1,1 +1,1 @@
-"""Rails that change along the track, as slices: from files, and made by formulas."""
+"""Rails that change along the track, described by slices from files or made by formulas."""

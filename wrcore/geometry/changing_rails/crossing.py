@@ -1,10 +1,10 @@
-"""A crossing made by a formula, as a table of slices: wing rail and nose of a turnout 1:12, usable by anybody.
+"""A crossing made by a formula, as a table of slices: wing rail and nose of a turnout 1:12, free to use.
 
     python -m wrcore.geometry.changing_rails.crossing FOLDER
 
-writes ``crossing.csv`` and its profiles. A straight crossing is the same for both routes, but mirrored. The wing bends
-away to the field side at s = 0, the knuckle. The nose begins where it is 12 mm wide; its running edge continues the
-wing's. All heads are those of 60E1, upright. Angle and flangeway are common ones; the nose's first width, its depth
+writes ``crossing.csv`` and its profiles. A straight crossing is mirror-symmetric for its two routes. The wing rail
+bends to the field side at s = 0, the knuckle. The nose begins with a width of 12 mm; its running edge continues that of
+the wing. All heads are those of 60E1, upright. Angle and flangeway are common values; the nose's first width, its depth
 there, its ramp and the rounding of its ridge are chosen.
 """
 
@@ -19,20 +19,20 @@ from wrcore.geometry.changing_rails.made_rails import MadeRail, half_width, narr
 
 @dataclass(frozen=True)
 class Crossing(MadeRail):
-    """Dimensions, m."""
+    """Dimensions of a crossing, m."""
 
     angle: float = 1.0 / 12.0
     flangeway: float = 0.044
     first_width: float = 0.012
-    """Of the nose, where it begins."""
+    """Width of the nose at its beginning."""
     sunk: float = 0.002
-    """Depth of the nose there; it is low as it is narrow, too."""
+    """Depth of the nose at its beginning, in addition to that of its narrow shape."""
     ramp: float = 0.25
     """Length over which the nose rises to the wing's height."""
     ridge: float = 1e-3
     """Height over which the ridge of a narrow nose is rounded."""
     step: float = 0.025
-    """Distance of the slices, about."""
+    """Approximate distance of the slices."""
     before: float = 0.3
     """Length before the knuckle."""
 
@@ -40,22 +40,26 @@ class Crossing(MadeRail):
 
     @property
     def nose_begins(self):
-        """A flangeway behind the knuckle both running edges meet, at the theoretical point; the nose is wider."""
+        """Arc length of the nose's beginning, m.
+
+        The running edges meet at the theoretical point, flangeway / angle behind the knuckle; there the nose has width
+        0.
+        """
         return (self.flangeway + self.first_width) / self.angle
 
     @property
     def after(self):
-        """Length behind the nose's beginning, up to where it is a whole head."""
+        """Length from the beginning of the nose to its full head width, m."""
         return (2.0 * half_width() - self.first_width) / self.angle
 
     def arc_lengths(self):
-        """Of the slices; at one of them the nose begins."""
+        """Return the arc lengths of the slices, m; the nose begins at one of them."""
         ends = -self.before, 0.0, self.nose_begins, self.nose_begins + self.after
         parts = [np.linspace(a, b, round((b - a) / self.step), endpoint=False) for a, b in pairwise(ends)]
         return np.concatenate([*parts, ends[-1:]])
 
     def heads(self, s):
-        """Points u, f (m) of wing and nose at s (m)."""
+        """Return the points u, f (m) of wing and nose at arc length s (m), by the heads' names."""
         heads, behind = {"wing": whole_head(self.angle * max(s, 0.0))}, s - self.nose_begins
         if behind < -1e-9:
             return heads

@@ -1,14 +1,12 @@
-"""Files of rails that change along the track and of wheels out of round: CONTACT's ``.slcs`` and ``.slcw``, and plain
-tables of slices.
+"""Files of changing rails and out-of-round wheels: CONTACT's ``.slcs`` and ``.slcw``, and CSV tables of slices.
 
 ``.slcs``: counters, a line ``s 'profile'`` per slice, and positions of feature lines (chord length from the
-section's first point, mm; -1: the line does not exist there); ``%`` begins a comment. Profiles that are columns are in
-the unit of s and count downwards, unless it is said otherwise. ``.slcw`` is the same over the wheel's angle in place of
-s, in radians.
+section's first point, mm; -1: the slice has no such line); ``%`` begins a comment. Profiles in columns have the unit of
+s and heights positive downwards, unless stated otherwise. ``.slcw`` has the wheel's angle in radians in place of s.
 
-Plain: a CSV with the columns s_m, profile (a point file, see `profile_files`) and, where a rail has several heads,
-head: a name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ...
-may give feature lines of a head: chord lengths from its inner end. A wheel's has angle_rad in place of s_m.
+CSV: a table with the columns s_m, profile (a point file, see `profile_files`) and, if a rail has several heads, head: a
+name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ... may
+state feature lines of a head: chord lengths from its inner end. A table of a wheel has angle_rad in place of s_m.
 
 Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 """
@@ -32,12 +30,13 @@ from wrcore.kernels.told import warn_once
 
 SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
 PLACES = {"rail": "s_m", "wheel": "angle_rad"}
-"""The ending of files of slices of a rail and of a wheel, and the column of a table that says where a slice is."""
+"""Endings of files of slices of a rail and of a wheel, and the column of a table with a slice's position."""
 MOST_SLICES = 100_000
 BEYOND = 8
-"""Slices added beyond either end of a wheel that they go round: what a spline's ends are free to do has died away."""
+"""Number of slices repeated beyond either end of a whole turn of a wheel, so that the spline's end conditions have no
+effect on the turn."""
 WIDEST = 0.5
-"""Sections that are wider or higher than this, m, are taken for a mistake."""
+"""Largest accepted width and height of a section, m; it detects wrong units."""
 
 _QUOTED = r"'([^']+)'|\"([^\"]+)\""
 _CLOSE = 1e-7  # m; as for profiles
@@ -46,8 +45,10 @@ _KEYS = {"slices", "unit", "mirrored", "downwards", "wavelength"}
 
 
 def is_slices(path, kind="rail"):
-    """Whether a file lists slices of a ``kind``: by its ending, or a CSV whose header has s_m (of wheels angle_rad) and
-    profile."""
+    """Whether a file lists slices of a ``kind``, by its ending or by the columns of a CSV's header.
+
+    The columns are s_m (of wheels angle_rad) and profile.
+    """
     path = Path(path)
     if path.suffix.lower() == SLICE_FILES[kind]:
         return True
@@ -57,10 +58,12 @@ def is_slices(path, kind="rail"):
 
 
 def read_slices(spec, kind="rail", described_by=None):
-    """`RailSlices`, of a wheel `WheelSlices`, from the path of a file of slices, or from a dict of ``slices`` (the
-    path) and how to read profiles that are columns: ``unit``, ``mirrored``, ``downwards`` as for `read_profile`; and a
-    ``wavelength`` (m): of waves so long half is left, shorter ones of measured sections are evened out. InputError
-    names file and line, or where the dict comes from (``described_by``)."""
+    """Read `RailSlices`, or `WheelSlices` of a wheel, from a file of slices.
+
+    ``spec`` is the path or a dict. Keys: ``slices`` (the path); ``unit``, ``mirrored``, ``downwards`` for profiles in
+    columns, as in `read_profile`; ``wavelength`` (m): measured sections are smoothed, waves of this length to half of
+    their amplitude. An InputError names file and line, or the source of the dict (``described_by``).
+    """
     spec = spec if isinstance(spec, dict) else {"slices": spec}
     try:
         return _read(spec, kind)
@@ -81,8 +84,10 @@ def _read(spec, kind):
 
 
 def with_profiles(path, renamed):
-    """The text of a file of slices with the names of its profiles as ``renamed`` has each; OSError or ValueError where
-    it cannot be read. It need not be a file of slices."""
+    """Return the text of a file of slices with ``renamed(name)`` in place of each profile's name.
+
+    Other files are returned unchanged. OSError or ValueError if the file cannot be read.
+    """
     check_regular(path)
     text = Path(path).read_text(errors="replace")
     if Path(path).suffix.lower() in SLICE_FILES.values():
@@ -99,7 +104,7 @@ def with_profiles(path, renamed):
 
 
 def profiles_in(path):
-    """Paths of the profiles that a file lists if it is one of slices, each once."""
+    """Return the paths of the profiles that a file of slices lists, each once; empty for other files."""
     found = {}
     with suppress(OSError, ValueError):
         with_profiles(path, lambda name: found.setdefault(name, name))
@@ -107,7 +112,7 @@ def profiles_in(path):
 
 
 def _lines(path):
-    """Lines that say something, with their numbers."""
+    """Return the lines that are not empty after removal of comments, with their numbers."""
     try:
         check_regular(path)
         text = path.read_text(errors="replace")
@@ -119,13 +124,13 @@ def _lines(path):
 
 
 class _Lines:
-    """Lines of a ``.slcs`` file one after the other."""
+    """Reader of the lines of a ``.slcs`` file, one after the other."""
 
     def __init__(self, path):
         self.path, self._rest = path, iter(_lines(path))
 
     def take(self, count, what):
-        """The next line's number, its first ``count`` numbers, and the line."""
+        """Return the next line's number, its first ``count`` values, and the line; ``what`` names them in errors."""
         number, line = next(self._rest, (0, None))
         if line is None:
             raise InputError(self.path, what, "expected this, got the end of the file (truncated?)")
@@ -180,7 +185,7 @@ def _read_slcs(path, how, kind):
 
 
 def _listed(lines):
-    """Line, arc length (in the file's unit) and profile of a slice."""
+    """Return line number, arc length (in the file's unit) and profile name of a slice."""
     number, (value,), line = lines.take(1, "arc length and profile of a slice")
     name = re.search(_QUOTED, line)
     if name is None:
@@ -189,7 +194,7 @@ def _listed(lines):
 
 
 def _places(lines, path, features, value):
-    """Positions of a slice's feature lines, m; NaN: none."""
+    """Return the line number and the positions of a slice's feature lines, m; NaN for lines it does not have."""
     number, (at, *places), _ = lines.take(features + 1, f"s and {features} positions of feature lines")
     if abs(at - value) > 1e-6 * max(1.0, abs(value)):
         raise InputError(path, f"line {number}", f"expected the feature lines of the slice at {value:g}, got {at:g}")
@@ -201,7 +206,7 @@ def _places(lines, path, features, value):
 
 
 def _read_table(path, how, kind):
-    """Slices of a CSV by their heads."""
+    """Read the slices of a CSV table."""
     file, place = read_column_file(path), PLACES[kind]
     names = _names(file, kind)
     for wanted in (place, "profile"):
@@ -236,20 +241,23 @@ def _read_table(path, how, kind):
 
 
 def _known(file, kind):
-    """Known names of a table's columns and factors to their units, by their indices."""
+    """Return known names of a table's columns with factors to SI units, by column index."""
     cuts = [f"{base}_m" for base, _ in map(split_unit, file.names) if re.fullmatch(r"cut_\d+", base)]
     return named_columns(file, (PLACES[kind], "profile", "head", *cuts))
 
 
 def _names(file, kind):
-    """Names of a table's columns, known ones as they are with SI units."""
+    """Return the names of a table's columns, known names with SI units."""
     found = _known(file, kind)
     return [found[k][0] if k in found else name for k, name in enumerate(file.names)]
 
 
 def _assembled(path, heads, kind, through=True):
-    """`RailSlices` or `WheelSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature
-    lines)); ``through`` as for `sheets_of`."""
+    """Build `RailSlices` or `WheelSlices` from heads.
+
+    A head is a name and rows (line, s, profile, keys for reading it, (line, feature lines)). ``through`` is as in
+    `sheets_of`.
+    """
     stations, known = np.unique([row[1] for _, rows in heads for row in rows]), {}
     sheets, alike = [], len(heads) == 1 and "wavelength" not in heads[0][1][0][3]
     for head, rows in heads:
@@ -281,12 +289,12 @@ def _assembled(path, heads, kind, through=True):
 
 
 def _wheel(path, angles, slices, through):
-    """`WheelSlices` at angles (rad)."""
+    """Build `WheelSlices` from slices at angles (rad); a whole turn is extended periodically."""
     turn = angles[-1] - angles[0]
     if turn > TURN + 1e-9:
         raise InputError(path, PLACES["wheel"], f"expected angles within one turn, got {turn:g} rad")
     gap = TURN - turn
-    if angles.size > 3 and gap < 1.5 * np.diff(angles).max():  # once round: the neighbours beyond either end are known
+    if angles.size > 3 and gap < 1.5 * np.diff(angles).max():  # a whole turn: it is periodic
         count = min(BEYOND, angles.size - 1)
         more = slice(int(gap < 1e-9), count), slice(-count, -1 if gap < 1e-9 else None)
         slices = [*slices[more[1]], *slices, *slices[more[0]]]
@@ -295,8 +303,10 @@ def _wheel(path, angles, slices, through):
 
 
 def _slice(path, row, kind, known):
-    """A `Slice` from its profile, which is among those that are ``known`` from then on; in a table its ends are feature
-    lines, too."""
+    """Return the `Slice` of a row; profiles are read once and stored in ``known``.
+
+    In a CSV table the profile's ends are feature lines, too.
+    """
     _, s, name, _, cuts = row
     if name not in known:
         known[name] = _profile(path, row, kind)
@@ -313,7 +323,7 @@ def _slice(path, row, kind, known):
 
 
 def _profile(path, row, kind):
-    """The profile of a row as a `Slice` without feature lines."""
+    """Return the profile of a row as a `Slice` whose only feature lines are its ends."""
     number, s, name, how, _ = row
     how, wavelength = {key: how[key] for key in how if key != "wavelength"}, how.get("wavelength", 0.0)
     u, f, *_ = read_points({"points": str(path.parent / name), **how}, kind)

@@ -1,10 +1,10 @@
-"""A dipped joint made by a formula, as a table of slices, usable by anybody.
+"""A dipped joint made by a formula, as a table of slices, free to use.
 
     python -m wrcore.geometry.changing_rails.joint FOLDER
 
-writes ``joint.csv`` and its profiles: two straight ends of rail that lean towards each other by an angle 2 alpha, the
-measure of Jenkins et al. (Railway Engineering Journal 3, 1974), and level out behind them. Heads are those of 60E1,
-upright. How long the parts are is chosen.
+writes ``joint.csv`` and its profiles: two straight rail ends with an angle 2 alpha between them, as defined by Jenkins
+et al. (Railway Engineering Journal 3, 1974), which level out away from the joint. Heads are those of 60E1, upright. The
+lengths of the parts are chosen.
 """
 
 import sys
@@ -15,33 +15,33 @@ import numpy as np
 from wrcore.geometry.changing_rails.made_rails import MadeRail, whole_head
 
 NEAR = 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05
-"""Arc lengths of slices beside the kink, m: cubics run through them."""
+"""Distances of the closest slices from the kink, m; they are dense because splines along the track round the kink."""
 
 
 @dataclass(frozen=True)
 class Joint(MadeRail):
-    """Dimensions, m."""
+    """Dimensions of a dipped joint, m."""
 
     angle: float = 0.01
-    """2 alpha, rad."""
+    """Angle 2 alpha between the rail ends, rad."""
     straight: float = 1.0
-    """Length of each end."""
+    """Length of the straight part of each rail end."""
     level: float = 1.0
-    """Length over which each levels out."""
+    """Length over which each rail end levels out."""
     step: float = 0.1
-    """Distance of the slices further away, about."""
+    """Approximate distance of the slices away from the kink."""
 
     names = ("rail",)
 
     def arc_lengths(self):
-        """Of the slices, m."""
+        """Return the arc lengths of the slices, m."""
         length = self.straight + self.level
         away = np.linspace(0.0, length, round(length / self.step) + 1)[1:]
         one = np.array([*NEAR, *away, length + self.step])
         return np.concatenate([-one[::-1], [0.0], one])
 
     def heads(self, s):
-        """Points u, f (m) of the rail at s (m)."""
+        """Return the points u, f (m) of the rail at arc length s (m), by the head's name."""
         near, beyond = min(abs(s), self.straight), min(max(abs(s) - self.straight, 0.0), self.level)
         risen = near + beyond - 0.5 * beyond**2 / self.level
         u, f = whole_head()

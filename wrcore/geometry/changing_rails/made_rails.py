@@ -1,4 +1,4 @@
-"""Rails made by a formula that change along the track: what crossings and switches have in common."""
+"""Changing rails made by a formula: common base of crossings, switches and joints."""
 
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -10,27 +10,27 @@ from wrcore.geometry.changing_rails.slices import RailSlices, Slice, sheets_of
 from wrcore.geometry.profiles.standards import named_profile
 
 EVEN = 5e-4
-"""Distance of points, m."""
+"""Distance of points along a head's outline, m."""
 
 _SIDE = 6e-3  # height of a head's sides, m
 
 
 class MadeRail(ABC):
-    """A rail with heads of 60E1, upright, each a curve of its own."""
+    """A changing rail with one or several upright heads of 60E1."""
 
     names: ClassVar[tuple]
-    """Of its heads."""
+    """Names of the heads."""
 
     @abstractmethod
     def arc_lengths(self):
-        """Of the slices, m; at one of them each head begins."""
+        """Return the arc lengths of the slices, m; each head begins at one of them."""
 
     @abstractmethod
     def heads(self, s):
-        """Points u, f (m) of the heads at s (m), by their names."""
+        """Return the points u, f (m) of the heads at arc length s (m), by their names."""
 
     def rail(self, name):
-        """All of it as `RailSlices`."""
+        """Return the rail as `RailSlices` with this name."""
         s = self.arc_lengths()
         slices = [{one: Slice.through(at, *points) for one, points in self.heads(at).items()} for at in s]
         sheets = [sheet for head in self.names for sheet in sheets_of(s, [one.get(head) for one in slices])]
@@ -39,7 +39,7 @@ class MadeRail(ABC):
         )
 
     def write(self, folder, file):
-        """Write it as a table of slices, a ``file`` of a folder, with a profile per head and slice; its path."""
+        """Write a table of slices and one profile for each head and slice into a folder; return the table's path."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         rows = ["s_m,head,profile"]
@@ -54,20 +54,23 @@ class MadeRail(ABC):
 
 
 def whole_head(moved=0.0):
-    """Points u, f (m) of a head ``moved`` to the field side, m."""
+    """Return the points u, f (m) of a full head, ``moved`` to the field side (m)."""
     head = named_profile("60E1", "rail", 0.0)
     return evenly(head.u + moved, head.f)
 
 
 def half_width():
-    """Of a head, m."""
+    """Return half of the width of a 60E1 head, m."""
     head = named_profile("60E1", "rail", 0.0)
     return head.gauge_offset(-head.f[0])
 
 
 def narrow_head(width, ridge, sunk, steep=1.0):
-    """Points u, f (m) of the inner half of a head and another one turned round beside it, as wide as asked, whose
-    ridge is rounded over the height ``ridge``, and all ``sunk``, m. The outer side is so many times as ``steep``."""
+    """Return the points u, f (m) of a narrow head: the inner half of a 60E1 head joined to a mirrored half.
+
+    ``width`` is the head's width, m; the ridge between both halves is rounded over the height ``ridge``, m. The head is
+    lowered by ``sunk``, m. ``steep`` multiplies the slope of the outer side.
+    """
     head, edge = named_profile("60E1", "rail", 0.0), half_width()
     narrow = min(1.0, max(0.0, 2.0 * edge - width) / edge)  # a full head has no ridge, and is symmetrical
     u = np.arange(-edge, width - edge, 0.1 * EVEN)
@@ -79,7 +82,7 @@ def narrow_head(width, ridge, sunk, steep=1.0):
 
 
 def evenly(u, f):
-    """Points at even distances along a head's outline, with sides 1:20 below it."""
+    """Return points at equal distances `EVEN` along a head's outline, extended downwards by sides of 1:20."""
     u = np.concatenate([u[:1] - 0.05 * _SIDE, u, u[-1:] + 0.05 * _SIDE])
     f = np.concatenate([f[:1] - _SIDE, f, f[-1:] - _SIDE])
     length = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f))))

@@ -1,10 +1,10 @@
-"""Rails that change along the track and wheels out of round: sections at arc lengths or angles, and what lies between.
+"""Changing rails and out-of-round wheels: interpolation between sections at arc lengths or angles.
 
-A section is cut by feature lines into parts, each with the same number of points in all slices. Through the points that
-correspond run cubic splines along the track (not-a-knot), so that features are interpolated along, not across. A part
-exists only from the first to the last slice of a run that has it: heads begin and end there. Before the rail's first
-and after its last slice the rail goes on unchanged. This is how CONTACT (its user guide, variable profiles) reads
-``.slcs`` files of slices.
+Feature lines divide a section into parts, each with the same number of points in all slices. Cubic splines along the
+track (not-a-knot) connect corresponding points, so that features are interpolated along the feature lines. A part
+exists from the first to the last of successive slices that have it: heads begin and end there. Before its first and
+after its last slice the rail is prismatic. CONTACT (its user guide, variable profiles) reads ``.slcs`` files of slices
+in this way.
 """
 
 from dataclasses import dataclass, replace
@@ -16,21 +16,21 @@ from wrcore.geometry.profiles.profile import GAUGE_DEPTH, SPACING, STEEPEST, Pro
 from wrcore.kernels.jit import jit
 
 PATH_STEP = 5e-4
-"""Greatest distance of the paths across a part, in the slice where it is widest, m: as in CONTACT. A section is the
-cubic spline through them, which evens out what is shorter."""
+"""Largest distance of the paths across a part in the slice where it is widest, m, as in CONTACT. A section is the cubic
+spline through the paths' points, which smooths shorter features."""
 
 NARROWEST = 2e-3
-"""A head is at least so wide, m."""
+"""Smallest width of a head, m."""
 
 TURN = 2.0 * np.pi
 
-# Of a point on a path: its place, and its rates over the path's number.
+# Rows of a point on a path: coordinates u and f, and their derivatives with respect to the path's number.
 U, F, U_RATE, F_RATE = range(4)
 
 
 @dataclass(frozen=True)
 class Slice:
-    """One section: arc length, the cubic spline (u, f) over its chord length (m), and where its parts are cut."""
+    """One section: arc length (m), cubic spline (u, f) over its chord length (m), and its feature lines."""
 
     s: float
     curve: object
@@ -39,8 +39,11 @@ class Slice:
 
     @classmethod
     def through(cls, s, u, f, wavelength=0.0):
-        """A slice through points u, f (m) from the track's centre outwards, or without their waves shorter than a
-        ``wavelength`` (m); its ends are its only feature lines."""
+        """Return a slice through points u, f (m), ordered from the track's centre outwards.
+
+        With a ``wavelength`` (m), shorter waves of the points are smoothed. The slice's ends are its only feature
+        lines.
+        """
         from scipy.interpolate import CubicSpline, make_smoothing_spline
 
         length, points = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f)))), np.column_stack([u, f])
@@ -56,15 +59,18 @@ class Sheet:
 
     first: float
     last: float
-    """Arc lengths between which it exists, m; infinite where the rail goes on unchanged."""
+    """Arc lengths at which the part begins and ends, m; infinite if it continues beyond the first or last slice."""
     s: np.ndarray
     spline: object
-    """Of the points (4, paths) over s; None for a single slice."""
+    """Spline of the points (4, paths) over s; None for a single slice."""
     points: np.ndarray
-    """(slices, 4, paths)."""
+    """(slices, 4, paths): points in rows U, F, U_RATE, F_RATE."""
 
     def at(self, s, nu=0):
-        """Points (n, 4, paths) at arc lengths (n,), or their first derivative; NaN where the part does not exist."""
+        """Return points (n, 4, paths) at arc lengths s (n,), or with ``nu`` = 1 their derivative with respect to s.
+
+        Values are NaN at arc lengths outside the part.
+        """
         s = np.atleast_1d(np.asarray(s, float))
         inside = np.clip(s, self.s[0], self.s[-1])
         if self.spline is None:
@@ -79,9 +85,10 @@ class Sheet:
 
 @dataclass(frozen=True)
 class RailSlices:
-    """A rail of slices: heights, slopes and heads at any arc length.
+    """A rail described by slices: heights, slopes and heads at any arc length.
 
-    Lateral coordinates u count to the field side, heights f up (m), from the files' origin unless it was `moved`."""
+    Lateral coordinates u are positive to the field side, heights f upwards (m), from the files' origin or that of
+    `moved`."""
 
     name: str
     s: np.ndarray
@@ -89,30 +96,35 @@ class RailSlices:
     sheets: tuple
     source: str = ""
     alike: bool = False
-    """Whether all slices are the same."""
+    """Whether all slices are equal."""
     first: object = None
-    """How `read_profile` reads the first slice's profile (dict)."""
+    """Arguments with which `read_profile` reads the first slice's profile (dict)."""
 
     @classmethod
     def of(cls, curve):
-        """A rail with the same `ProfileCurve` everywhere."""
+        """Return a prismatic rail with the profile of a `ProfileCurve`."""
         sheets = sheets_of(np.zeros(1), [Slice.through(0.0, curve.u, curve.f)])
         return cls(curve.name, np.zeros(1), tuple(sheets), curve.source, True)
 
     def moved(self, du, df):
-        """The rail moved by ``du`` to the field side and ``df`` up, m."""
+        """Return the rail moved by ``du`` to the field side and ``df`` upwards, m."""
         shift = np.array([du, df, 0.0, 0.0])[:, None]
         return replace(self, sheets=tuple(_moved(sheet, shift) for sheet in self.sheets))
 
     def along(self, plain, depth=GAUGE_DEPTH):
-        """The rail moved so that the first slice's inner face, within ``depth`` (m) of its top, and its top lie where
-        those of a ``plain`` rail do, in whose coordinates it is then."""
+        """Return the rail in the coordinates of a ``plain`` rail.
+
+        The first slice's top and its inner face within ``depth`` (m) of the top are moved to those of the plain rail.
+        """
         placed, distance = self.placed(depth)
         return placed.moved(distance - plain.gauge_offset(depth), 0.0)
 
     def placed(self, depth=GAUGE_DEPTH):
-        """The rail moved so that the first slice's highest point is its origin, and the distance (m, positive) from
-        there to its innermost point within ``depth`` (m) of it on the same head."""
+        """Return the rail with its origin at the first slice's highest point, and that point's gauge distance.
+
+        The distance (m, positive) is from the origin to the innermost point within ``depth`` (m) of the top on the same
+        head.
+        """
         points = [sheet.at(self.s[0])[0] for sheet in self.sheets if sheet.first <= self.s[0]]
         u, f = (np.concatenate([p[row] for p in points]) for row in (U, F))
         top = int(np.argmax(f))
@@ -127,23 +139,29 @@ class RailSlices:
 
     @property
     def lateral(self):
-        """Least and greatest lateral coordinate, m."""
+        """Minimum and maximum lateral coordinate, m."""
         points = [sheet.points[:, U] for sheet in self.sheets]
         return min(float(p.min()) for p in points), max(float(p.max()) for p in points)
 
     def begins(self):
-        """Arc lengths at which a part begins or ends, m, sorted."""
+        """Return the arc lengths at which a part begins or ends, m, sorted."""
         ends = [end for sheet in self.sheets for end in (sheet.first, sheet.last)]
         return np.unique([end for end in ends if np.isfinite(end)])
 
     def heights(self, s, u):
-        """Height (m) of the rail at arc lengths (n,) over lateral coordinates (m,) that increase evenly, its slope
-        across, and its slope along the track, each (n, m); NaN where there is no rail or only a wall."""
+        """Return height (m), slope across and slope along the track, each (n, m), as one array (3, n, m).
+
+        ``s`` (n,) are arc lengths, m; ``u`` (m,) are equally spaced increasing lateral coordinates, m. Values are NaN
+        without a rail or on faces steeper than `STEEPEST`.
+        """
         return _heights(self.sheets, s, u)
 
     def heads(self, s, spacing=SPACING):
-        """Heads at an arc length (m), `ProfileCurve` each, from the track's centre outwards: runs of the section that
-        are single-valued and no steeper than `STEEPEST`. Their ordinates count from the rail's own origin."""
+        """Return the heads at an arc length (m) as `ProfileCurve`, from the track's centre outwards.
+
+        A head is a part of the section that is single-valued and no steeper than `STEEPEST`. Coordinates are those of
+        the rail.
+        """
         points = [sheet.at(s)[0] for sheet in self.sheets if sheet.first <= s <= sheet.last]
         low, high = min(p[U].min() for p in points), max(p[U].max() for p in points)
         u = spacing * np.arange(np.ceil(low / spacing), np.floor(high / spacing) + 1)
@@ -162,19 +180,21 @@ class RailSlices:
 
 @dataclass(frozen=True)
 class WheelSlices:
-    """A wheel of slices: its profile at angles about its axle, constant beyond them unless they go round.
+    """A wheel described by slices: its profile at angles about its axle.
 
-    Lateral coordinates u count to the field side, heights f up, from the tape circle: the radius is r0 - f. Angles
-    count from the wheel's lowest point, when it has not turned, towards x ahead.
+    If the slices do not cover the whole turn, the profile is constant beyond the first and the last.
+
+    Lateral coordinates u are positive to the field side, heights f upwards, from the tape circle: the radius is r0 - f.
+    Angles are measured from the lowest point of the unturned wheel, positive towards x ahead.
     """
 
     name: str
     angles: np.ndarray
-    """Of the slices, rad; of a wheel with slices all round with some of them again beyond either end."""
+    """Angles of the slices, rad; if they cover the whole turn, some slices are repeated beyond either end."""
     sheets: tuple
 
     def round(self):
-        """`ProfileCurve` of a wheel of revolution near it: of the slice that reaches furthest at the tape circle."""
+        """Return the `ProfileCurve` of a similar round wheel: that of the slice with the largest tape circle radius."""
         f = self.heights(self.angles, np.zeros(1))[0, :, 0]
         if not np.isfinite(f).any():
             raise InputError(self.name, "", "expected profiles that reach over the tape circle, u = 0")
@@ -188,15 +208,18 @@ class WheelSlices:
         return ProfileCurve(self.name, "wheel", u[run], f[run].copy(), slope[run].copy(), second, self.name)
 
     def heights(self, angles, u):
-        """Height (m) at angles (n,) of any turn over lateral coordinates (m,) that increase evenly, its slope across,
-        and its rate over the angle (m/rad), each (n, m); NaN where there is no profile or only a wall."""
+        """Return height (m), slope across and derivative with respect to the angle (m/rad), as one array (3, n, m).
+
+        ``angles`` (n,) may be of any turn, rad; ``u`` (m,) are equally spaced increasing lateral coordinates, m. Values
+        are NaN without a profile or on faces steeper than `STEEPEST`.
+        """
         middle = 0.5 * (self.angles[0] + self.angles[-1])
         within = middle + np.remainder(np.asarray(angles) - middle + 0.5 * TURN, TURN) - 0.5 * TURN
         return _heights(self.sheets, within, u)
 
 
 def _heights(sheets, s, u):
-    """Height of sheets and both slopes, see `RailSlices.heights`."""
+    """Return height and both slopes of sheets (3, n, m), see `RailSlices.heights`."""
     s, u = np.atleast_1d(np.asarray(s, float)), np.ascontiguousarray(u, float)
     found = np.full((3, s.size, u.size), np.nan)
     step = (u[-1] - u[0]) / (u.size - 1) if u.size > 1 else 1.0
@@ -208,8 +231,11 @@ def _heights(sheets, s, u):
 
 
 def sheets_of(s, slices, through=True):
-    """Sheets of one head's slices, a `Slice` or None at each of the rail's arc lengths ``s`` (m, increasing); not
-    ``through`` the slices: they are the control points of cubic B-splines, which even out what they hold."""
+    """Return the sheets of one head.
+
+    ``slices`` holds a `Slice` or None for each of the rail's arc lengths ``s`` (m, increasing). If ``through`` is
+    False, the slices are control points of cubic B-splines, which smooth them.
+    """
     size = next(one.cuts.size for one in slices if one)
     cuts = np.array([one.cuts if one else np.full(size, np.nan) for one in slices])
     width = np.diff(cuts, axis=1)
@@ -228,7 +254,10 @@ def sheets_of(s, slices, through=True):
 
 
 def _section(one, counts):
-    """Points (4, paths) of each part of a slice, None where it has none: the section is smooth across feature lines."""
+    """Return points (4, paths) of each part of a slice, or None for a missing part.
+
+    The section is smooth across feature lines.
+    """
     from scipy.interpolate import CubicSpline
 
     points = [None] * len(counts)
@@ -247,7 +276,7 @@ def _section(one, counts):
 
 
 def _runs(flags):
-    """Indices of the runs of True."""
+    """Return the index arrays of consecutive True values."""
     at = np.flatnonzero(flags)
     return [run for run in np.split(at, np.flatnonzero(np.diff(at) != 1) + 1) if run.size]
 
@@ -261,7 +290,7 @@ def _moved(sheet, shift):
 
 
 def _sheet(s, run, points, through):
-    """The part with these points (slices, 4, paths) over a ``run`` of slices."""
+    """Return the `Sheet` of a part with these points (slices, 4, paths) over a ``run`` of slices."""
     from scipy.interpolate import CubicSpline
 
     first = -np.inf if run[0] == 0 else s[run[0]]
@@ -273,8 +302,10 @@ def _sheet(s, run, points, through):
 
 
 def _approximating(s, points):
-    """Cubic B-spline over s with ``points`` as control points, the outermost ones twice: at evenly spaced slices it
-    takes (1, 4, 1)/6 of three neighbours."""
+    """Return the cubic B-spline over s with ``points`` as control points, the outermost ones twice.
+
+    At equally spaced slices its value is (1, 4, 1)/6 of three neighbouring points.
+    """
     from scipy.interpolate import BSpline
 
     ends = (s[1] - s[0]) * np.arange(-3, 0), (s[-1] - s[-2]) * np.arange(1, 4)
@@ -284,8 +315,10 @@ def _approximating(s, points):
 
 @jit
 def _lay(points, rates, rows, u, step, found):
-    """Lay sections, ``points`` and ``rates`` along the track (n, 4, paths), over lateral coordinates into the rows of
-    ``found`` (3, all, m), where they are higher than what is there. Between two paths runs a cubic Hermite polynomial.
+    """Write height and slopes of sections into ``rows`` of ``found`` (3, all, m) at points higher than those present.
+
+    ``points`` and ``rates`` (derivatives along the track) have the shape (n, 4, paths). Between two paths the section
+    is a cubic Hermite polynomial.
     """
     for i in range(rows.size):
         k = rows[i]
