@@ -1,9 +1,8 @@
-"""Track irregularity: where the rails' lines deviate from the ideal track, as C2 functions of arc length.
+"""Track irregularity: deviation of the rails' lines from the ideal track, as C2 functions of arc length.
 
 Four channels: lateral (towards n, to the left positive) and vertical (towards b, up) deviation of the left and of the
-right rail. Between the nodes of a uniform grid runs a cubic spline, so that the curvature of the rails' lines is
-continuous. The deviation is faded in and out and is zero elsewhere. Several irregularities, each on a grid of its own,
-add up.
+right rail. They are cubic splines on a uniform grid, so that the curvature of the rails' lines is continuous. The
+deviation is faded in and out and is zero elsewhere. Several irregularities, each on its grid, are added.
 
 Measured or generated quantities are combined into the channels as follows: alignment and level are the means of both
 rails' lateral and vertical deviation, cross level is left minus right height, gauge is the change of the gauge.
@@ -28,16 +27,16 @@ MEANS = ("alignment", "level", "cross_level", "gauge")
 """Quantities that `combine` turns into the channels."""
 
 LARGEST = 0.05
-"""Deviations beyond this are taken for another unit, m."""
+"""Largest accepted deviation, m; it detects wrong units."""
 
 _CHAINAGES = ("chainage", "distance", "station", "position")
-"""Other names of the column of arc lengths."""
+"""Alternative names of the column of arc lengths."""
 
 _STATION = re.compile(r"(\d+)\+(\d{3}(?:[.,]\d*)?)")  # 12+450: kilometre and metres
-_PADDING = 40  # a cubic spline forgets a node by 0.268 per cell: 0.268^40 = 1e-23
+_PADDING = 40  # the influence of a node on a cubic spline decays by 0.268 per cell: 0.268^40 = 1e-23
 _MOST_CELLS = 2_000_000
 _WIDEST = 5.0
-"""Usual distances of samples over which what lies between them is made up."""
+"""Largest accepted gap between samples, in median distances of samples; a spline over a longer gap is not reliable."""
 
 CUTOFF_C, CUTOFF_R, CUTOFF_S = 0.8246, 0.0206, 0.4380
 """Cut-off wave numbers of the German (ERRI B 176) spectra, rad/m."""
@@ -55,31 +54,35 @@ FRA_SHARE, FRA_CUTOFF = 0.25, 0.8245
 """Factor k, and cut-off wave number (rad/m), of the American spectra."""
 
 FRA = {"fra_5": (2.095e-5, 7.62e-6, 0.8209), "fra_6": (3.39e-6, 3.39e-6, 0.4380)}
-"""Of the FRA's track classes 5 and 6: roughness factors A_v and A_a (m rad), cut-off of cross level (rad/m)."""
+"""Constants of the FRA's track classes 5 and 6: roughness factors A_v and A_a (m rad), cut-off wave number of cross
+level (rad/m)."""
 
 
 class IrregularityData(NamedTuple):
-    """Irregularity for kernels; without one ``coefficients.shape[0] == 0``."""
+    """Irregularity for kernels; for perfect rails ``coefficients.shape[0] == 0``."""
 
     coefficients: np.ndarray
-    """(cells, 4, 4): powers 0 to 3 of the distance from the cell's beginning (m), four channels each."""
+    """(cells, 4, 4): coefficients of the powers 0 to 3 of the distance from the cell's beginning (m), for each of four
+    channels."""
     starts: np.ndarray
     """(n,): beginning of the first cell of each irregularity, m."""
     steps: np.ndarray
-    """(n,): length of its cells, m."""
+    """(n,): length of the cells of each irregularity, m."""
     first: np.ndarray
-    """(n + 1,) int: where its cells begin, and where they end."""
+    """(n + 1,) int: index of the first cell of each irregularity, then the number of cells."""
 
 
 def no_irregularity():
-    """IrregularityData of perfect rails."""
+    """Return the IrregularityData of perfect rails."""
     return IrregularityData(np.zeros((0, 4, 4)), np.zeros(0), np.zeros(0), np.zeros(1, np.int64))
 
 
 @jit
 def irregularity_at(data, s, out):
-    """Deviations (m) and their first and second derivatives at arc length s (m) into ``out`` (3, 4), zero outside the
-    range; False, with ``out`` left as it is, for perfect rails."""
+    """Write deviations (m) and their first and second derivatives at arc length s (m) into ``out`` (3, 4).
+
+    They are zero outside the range. For perfect rails return False and leave ``out`` unchanged; else return True.
+    """
     if data.coefficients.shape[0] == 0:
         return False
     out[:, :] = 0.0
@@ -100,8 +103,11 @@ def irregularity_at(data, s, out):
 
 
 def irregularity_data(start, step, values):
-    """IrregularityData of samples (n, 4), m, in the order of `CHANNELS`, from arc length ``start`` on by ``step`` (m),
-    that begin and end at zero: a spline that dies out, C2, in cells of zeros added at both ends."""
+    """Return the IrregularityData of samples (n, 4), m, in the order of `CHANNELS`, that begin and end at zero.
+
+    The samples begin at arc length ``start`` (m) and are a ``step`` (m) apart. The C2 spline decays to zero in cells of
+    zeros that are added at both ends.
+    """
     values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
     coefficients = clamped_cubics(step * np.arange(len(values)), values)
     first, steps = np.array([start - _PADDING * step], float), np.array([step], float)
@@ -109,34 +115,39 @@ def irregularity_data(start, step, values):
 
 
 def sum_of(parts):
-    """IrregularityData of several ones that add up."""
-    sizes = np.concatenate([np.diff(part.first) for part in parts])  # of each irregularity of each part
+    """Return the IrregularityData of the sum of several ones."""
+    sizes = np.concatenate([np.diff(part.first) for part in parts])  # cells of each irregularity of each part
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in ("coefficients", "starts", "steps"))
     return IrregularityData(*joined, np.cumsum([0, *sizes]))
 
 
 def irregularity_extents(data):
-    """Arc lengths of the first and the last sample of each irregularity, (n, 2), m: elsewhere rails are perfect."""
+    """Return arc lengths (n, 2), m, of the first and last sample of each irregularity; elsewhere rails are perfect."""
     ends = data.starts + data.steps * (np.diff(data.first) - _PADDING)
     return np.column_stack([data.starts + _PADDING * data.steps, ends])
 
 
 def combine(alignment, level, cross_level, gauge):
-    """Channels (n, 4) from the means of both rails, cross level (left minus right) and change of gauge, all (n,), m."""
+    """Return the channels (n, 4), m, from alignment, level, cross level and change of gauge, all (n,), m.
+
+    Alignment and level are means of both rails, cross level is left minus right height.
+    """
     return np.stack(
         [alignment + 0.5 * gauge, level + 0.5 * cross_level, alignment - 0.5 * gauge, level - 0.5 * cross_level], -1
     )
 
 
 def _smooth(distance, length):
-    """Factor from 0 to 1 over a length (m), with two derivatives zero at both ends."""
+    """Return a fade factor that rises from 0 to 1 over a length (m), with two zero derivatives at both ends."""
     t = np.clip(distance / length, 0.0, 1.0) if length > 0.0 else np.ones_like(distance)
     return t**3 * (10.0 + t * (6.0 * t - 15.0))
 
 
 def faded(s, values, fade_in, fade_out, source, field):
-    """IrregularityData from samples at uniform arc lengths s (n,), values (n, 4), both in m; InputError if the fades
-    are longer, or the ends are neither zero nor faded."""
+    """Return the IrregularityData of faded samples at uniform arc lengths s (n,), values (n, 4), both in m.
+
+    An InputError is raised if the fades are longer than the samples, or if the ends are neither zero nor faded.
+    """
     if fade_in + fade_out > s[-1] - s[0]:
         raise InputError(source, field, f"expected fades shorter than the {s[-1] - s[0]:g} m of irregularity")
     values = values * (_smooth(s - s[0], fade_in) * _smooth(s[-1] - s, fade_out))[:, None]
@@ -147,14 +158,13 @@ def faded(s, values, fade_in, fade_out, source, field):
 
 
 def read_irregularity(path, gauge=None):
-    """Uniform arc lengths (n,) and deviations (n, 4), both in m, of a file of measured irregularity.
+    """Read uniform arc lengths (n,) and deviations (n, 4), both in m, from a file of measured irregularity.
 
     The header names the chainage (``s_m``; also chainage, distance, station, position or km, which may be written
-    12+450) and either any of `CHANNELS` or any of `MEANS`, each with its unit (`wrcore.errors.column_files`); columns
-    that are missing are zero. An absolute gauge becomes its change where the track's ``gauge`` (m) is given, which is
-    said. Samples at varying distances are carried over, by a cubic spline, to a grid of the smallest distance, which is
-    said. InputError names the file and the line or column at fault: also where such a spline would make up what lies
-    between samples."""
+    12+450) and either any of `CHANNELS` or any of `MEANS`, each with its unit (`wrcore.errors.column_files`). Missing
+    columns are zero. The track's ``gauge`` (m), if given, is subtracted from an absolute gauge, with a warning. Samples
+    at varying distances are interpolated by a cubic spline on a grid of the smallest distance, with a warning. An
+    InputError names the file and the wrong line or column, also if such a spline would overshoot between samples."""
     s, columns, lines = _read_table(path)
     wrong = np.flatnonzero(np.diff(s) <= 0.0)
     if wrong.size:
@@ -178,7 +188,7 @@ def read_irregularity(path, gauge=None):
 
 
 def _change_of_gauge(absolute, gauge, path):
-    """Change of the gauge (m) from what a file has of it, absolute."""
+    """Return the change of the gauge (m) from a file's absolute gauge (m); InputError without the track's gauge."""
     got = f"an absolute gauge, {absolute.mean():.4f} m in the mean"
     if gauge is None:
         expected = "expected the change of the gauge: subtract the design gauge with its widening"
@@ -192,7 +202,7 @@ def _change_of_gauge(absolute, gauge, path):
 
 
 def _read_table(path):
-    """Arc lengths (n,), columns by their names, in m, and line numbers of a file."""
+    """Return arc lengths (n,) and columns by name, in m, and the line numbers of a file."""
     file = read_column_file(path)
     file = file._replace(names=tuple("s_km" if name.lower() == "km" else name for name in file.names))
     known = [{f"{name}_m" for name in group} for group in (CHANNELS, MEANS)]
@@ -222,6 +232,7 @@ def _read_table(path):
 
 
 def _uniform(s, values, path, lines):
+    """Return arc lengths and values on a uniform grid; InputError for gaps and overshoot of the spline."""
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(s)
@@ -242,7 +253,7 @@ def _uniform(s, values, path, lines):
 
 
 def _check_overshoot(s, values, grid, carried, path, lines):
-    """Refuse what goes farther beyond two samples than half the largest step between samples around them."""
+    """Raise an InputError if the spline overshoots two samples by more than half the largest step nearby, plus 2 %."""
     steps = np.pad(np.abs(np.diff(values, axis=0)), ((2, 2), (0, 0)))
     near = np.lib.stride_tricks.sliding_window_view(steps, 5, axis=0).max(axis=-1)
     cell = np.clip(np.searchsorted(s, grid, "right") - 1, 0, len(s) - 2)
@@ -257,13 +268,15 @@ def _check_overshoot(s, values, grid, carried, path, lines):
 
 
 def spectrum(quantity, level, omega):
-    """Power spectral density over wave numbers ``omega`` (rad/m) of the mean "level" or "alignment" (m^2/(rad/m)), or
-    of the "cross_angle" between the rails' heights (rad^2/(rad/m)). One-sided and per rad/m: a band's variance is the
-    integral of S over its positive wave numbers, without a further factor 2 or 2 pi.
+    """Return the power spectral density S of track irregularity over wave numbers ``omega`` (rad/m).
+
+    ``quantity`` is the mean "level" or "alignment" (m^2/(rad/m)), or the "cross_angle" between the rails' heights
+    (rad^2/(rad/m)). S is one-sided and per rad/m: a band's variance is the integral of S over its positive wave
+    numbers, without a further factor 2 or 2 pi.
 
     "low" or "high": German (ERRI B 176 RP 1, 1993; constants as in public codes). "fra_5" or "fra_6": American, of the
-    FRA's track classes 5 and 6 (X. Lei, N.-A. Noda, J. Sound Vib. 258 (2002) 147-165; constants as two public codes
-    have them alike, which those of classes 1 to 4 are not found to be)."""
+    FRA's track classes 5 and 6 (X. Lei, N.-A. Noda, J. Sound Vib. 258 (2002) 147-165; two public codes agree on these
+    constants, but not on those of classes 1 to 4)."""
     square = np.asarray(omega, float) ** 2
     if level in FRA:
         vertical, lateral, cross = FRA[level]
@@ -278,13 +291,14 @@ def spectrum(quantity, level, omega):
 
 
 def generate(level, seed, length, spacing, shortest, longest):
-    """Arc lengths s from 0 to about ``length`` (n,) and deviations (n, 4), not faded, all in m, of random irregularity
-    with a :func:`spectrum`, wavelengths from ``shortest`` to ``longest`` (m); the same seed, length and spacing (m)
-    give the same track.
+    """Generate random irregularity with a :func:`spectrum`, wavelengths from ``shortest`` to ``longest`` (m).
 
-    A sum of cosines with random phases: their wave numbers are the multiples of 2 pi / period, the period being at
-    least twice the length, and each carries the variance of its own share of the band. Alignment, level and cross level
-    are independent; the gauge stays as it is (the spectra know none)."""
+    Return arc lengths s (n,) from 0 to about ``length`` and deviations (n, 4), not faded, all in m. Equal seed, length
+    and spacing (m) result in equal tracks.
+
+    The deviation is a sum of cosines with random phases. Their wave numbers are the multiples of 2 pi / period, with a
+    period of at least twice the length; each has the variance of its interval of wave numbers. Alignment, level and
+    cross level are independent; the gauge is constant, as the spectra do not include it."""
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
     period = _fast_length(2 * len(s))
     random = np.random.default_rng(seed)
@@ -296,8 +310,10 @@ def generate(level, seed, length, spacing, shortest, longest):
 
 
 def _fast_length(least):
-    """Return the smallest product of powers of 2, 3 and 5 that is no less than ``least``: a Fourier transform of this
-    length is fast. The import of ``scipy.fft``, which has it as ``next_fast_len``, takes 0.1 s."""
+    """Return the smallest product of powers of 2, 3 and 5 that is no less than ``least``.
+
+    A Fourier transform of this length is fast. It replaces ``scipy.fft.next_fast_len``, whose import takes 0.1 s.
+    """
     best = 1 << (least - 1).bit_length()
     five = 1
     while five < best:
@@ -310,7 +326,7 @@ def _fast_length(least):
 
 
 def _realise(quantity, level, random, period, spacing, shortest, longest):
-    """One periodic realisation (period,) of a spectrum."""
+    """Return one periodic realisation (period,) of a spectrum."""
     step = 2.0 * np.pi / (period * spacing)
     omega = step * np.arange(period // 2 + 1)
     ends = 2.0 * np.pi / longest, 2.0 * np.pi / shortest

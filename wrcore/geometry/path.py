@@ -1,10 +1,10 @@
-"""The track's path: its centre line and the frame [t n b] that travels along it, as functions of arc length.
+"""The track's path: its centre line and the moving frame [t n b], as functions of arc length.
 
-The path is cut into pieces on which curvature, cant, height and widening are cubics of the arc length s (straight
+The path is divided into pieces on which curvature, cant, height and widening are cubics of the arc length s (straight
 line, circle, clothoid, Bloss; a cosine transition is a spline of such pieces). A piece stores its centre line as
-polynomials in the distance from the piece's middle; pieces are so short that the heading hardly turns in one of them,
-which puts the truncation below the rounding error. A point and its tangent then cost two Horner schemes: no quadrature,
-no trigonometric function.
+polynomials in the distance from the piece's middle. Pieces are so short that the truncation error is below the rounding
+error (`wrcore.geometry.path_pieces.LARGEST_TURN`). A point and its tangent cost two Horner schemes, without quadrature
+or trigonometric functions.
 
 Conventions
 -----------
@@ -12,8 +12,8 @@ Conventions
 * heading is the angle of t's projection onto the ground from the x axis, to the left positive; d heading/ds is the
   curvature.
 * cant h is the height of the right rail above the left one over `CANT_BASE`: positive in a canted left curve. The
-  frame's roll about t is -asin(h / CANT_BASE). What keeps its height is chosen: with the lower rail the centre line is
-  raised by |h|/2, so that t climbs in a ramp, and both rails with it.
+  frame's roll about t is -asin(h / CANT_BASE). The line of constant height is selectable: if it is the lower rail, the
+  centre line is raised by |h|/2, so that t and both rails climb in a ramp.
 * The corners of linear ramps of cant, height and widening are rounded: each corner is replaced over the path's rounding
   length by a cubic spline. They are C2, t is C1, curvature is continuous. Bloss and cosine ramps have no corners; at
   their ends they are C1. Gradients joined by vertical curves (parabolas) are C2, too.
@@ -29,26 +29,26 @@ from wrcore.kernels.jit import jit
 
 
 class PathData(NamedTuple):
-    """A path for kernels. A tangent track has no pieces (``pieces.shape[0] == 0``) and x = s."""
+    """A path for kernels; a tangent track has no pieces (``pieces.shape[0] == 0``) and x = s."""
 
     pieces: np.ndarray
     """(n, 34): middle; polynomials of x, y; heading; cubics of curvature, sin(roll), height, widening."""
     starts: np.ndarray
-    """(n,): arc length at which each piece begins, m. The first reaches back, the last on without end."""
+    """(n,): arc length at which each piece begins, m; the first begins at -inf, the last has no end."""
     lookup: np.ndarray
     """(m,) int: piece at the beginning of each cell of a uniform grid."""
     lookup_start: float
     lookup_step: float
-    """The grid, m."""
+    """First arc length and cell length of the grid, m."""
     aside: float
-    """Part of the widening by which the middle of both rails moves to the left: 0, or 1/2 where the left rail has all
-    of it, -1/2 where the right one has."""
+    """Fraction of the widening by which the middle between the rails moves to the left: 0 for equal widening of both
+    rails, 1/2 for widening of the left rail only, -1/2 of the right rail only."""
     climbs: bool = True
     """Whether the direction of the rails' lines has the twist of cant ramps."""
 
 
 class Station(NamedTuple):
-    """The centre line at one arc length; derivatives are by s."""
+    """The centre line at one arc length; derivatives are with respect to s."""
 
     x: float
     y: float
@@ -61,26 +61,26 @@ class Station(NamedTuple):
     level: float
     """Length of (tx, ty): the incline's cosine."""
     slope_rate: float
-    """1/m."""
+    """Derivative of slope, 1/m."""
     heading: float
-    """rad."""
+    """Angle of the tangent's ground projection from the x axis, rad, to the left positive."""
     curvature: float
     """d heading/ds, 1/m, positive to the left."""
     curvature_rate: float
-    """1/m^2."""
+    """Derivative of curvature, 1/m^2."""
     sin_roll: float
     cos_roll: float
     roll_rate: float
-    """1/m; roll is right-handed about t, so negative in a canted left curve."""
+    """Derivative of roll, 1/m; roll is right-handed about t, so negative in a canted left curve."""
     roll_rate_rate: float
-    """1/m^2."""
+    """Second derivative of roll, 1/m^2."""
     widening: float
-    """Gauge widening, m; half of it belongs to each rail unless the path says otherwise."""
+    """Gauge widening, m, of both rails together; see `PathData.aside`."""
     widening_rate: float
 
 
 def tangent_path():
-    """PathData of a straight, level path without an end."""
+    """Return the PathData of a straight, level path of infinite length."""
     return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0, 0.0)
 
 
@@ -88,13 +88,15 @@ def path_data(
     knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None, aside=0.0,
     climbs=True,
 ):  # fmt: skip
-    """PathData from curvature (1/m, 0 at the first knot), cant (m, right rail higher) and widening (m) at increasing
-    arc lengths ``knots`` (m), all (k,): straight before the first, constant after the last.
+    """Return the PathData from curvature, cant and widening at arc lengths ``knots``, all (k,).
 
-    The k - 1 ``shapes`` are those of `wrcore.geometry.ramps`, linear if left out; corners of cant and widening are
-    rounded over the length ``rounding`` (m). ``cant_about`` is "lower_rail", "inner_rail" (of the curve) or
-    "centreline": what keeps its height. ``incline`` (`wrcore.geometry.ramps.Incline`) is the height before cant,
-    ``aside`` and ``climbs`` those of `PathData`."""
+    Curvature in 1/m, 0 at the first knot; cant in m, right rail higher; widening in m; knots increasing, in m. The path
+    is straight before the first knot and constant after the last.
+
+    The k - 1 ``shapes`` are those of `wrcore.geometry.ramps`, linear by default; corners of cant and widening are
+    rounded over the length ``rounding`` (m). ``cant_about`` is the line of constant height: "lower_rail", "inner_rail"
+    (of the curve) or "centreline". ``incline`` (`wrcore.geometry.ramps.Incline`) is the height without cant, ``aside``
+    and ``climbs`` are those of `PathData`."""
     knots = np.asarray(knots, float)
     pieces, borders = cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
     starts = np.concatenate(([-math.inf], borders))
@@ -106,7 +108,7 @@ def path_data(
 
 @jit(inline="always")
 def segment_at(path, s):
-    """Index of the piece that holds arc length s (m); at most a few comparisons, whatever the path's length."""
+    """Return the index of the piece that contains arc length s (m); cost is independent of the path's length."""
     if s < path.lookup_start:
         return 0
     cell = min(max(int((s - path.lookup_start) / path.lookup_step), 0), path.lookup.shape[0] - 1)
@@ -118,7 +120,10 @@ def segment_at(path, s):
 
 @jit(inline="always")
 def _horner(pieces, i, at, d):
-    """Value and derivative of the polynomial of degree 7 at column ``at`` of piece i, even and odd part in parallel."""
+    """Return value and derivative of the polynomial of degree 7 at column ``at`` of piece i.
+
+    Even and odd part are independent, so that the processor evaluates them in parallel.
+    """
     a1, a2, a3, a4 = pieces[i, at + 1], pieces[i, at + 2], pieces[i, at + 3], pieces[i, at + 4]
     a5, a6, a7 = pieces[i, at + 5], pieces[i, at + 6], pieces[i, at + 7]
     q = d * d
@@ -129,14 +134,14 @@ def _horner(pieces, i, at, d):
 
 @jit(inline="always")
 def _cubic(pieces, i, at, d):
-    """Value and two derivatives of the cubic at column ``at`` of piece i."""
+    """Return value and two derivatives of the cubic at column ``at`` of piece i."""
     c1, c2, c3 = pieces[i, at + 1], pieces[i, at + 2], pieces[i, at + 3]
     return pieces[i, at] + d * (c1 + d * (c2 + d * c3)), c1 + d * (2.0 * c2 + 3.0 * d * c3), 2.0 * c2 + 6.0 * d * c3
 
 
 @jit
 def _on_last_circle(x, y, tx, ty, curvature, d):
-    """x, y, tx, ty at distance d along the circle that begins at (x, y) in the direction (tx, ty)."""
+    """Return x, y, tx, ty at distance d (m) along the circle that begins at (x, y) in the direction (tx, ty)."""
     half = 0.5 * curvature * d
     c, s = math.cos(half), math.sin(half)
     chord = d * (s / half if half != 0.0 else 1.0)
@@ -146,8 +151,10 @@ def _on_last_circle(x, y, tx, ty, curvature, d):
 
 @jit(forceinline=True)
 def centreline(path, s):
-    """The Station at arc length s (m): straight before the path; its last curvature, cant, widening and gradient after
-    it."""
+    """Return the Station at arc length s (m).
+
+    Before the path it is straight; after the path curvature, cant, widening and gradient keep their last values.
+    """
     if path.pieces.shape[0] == 0:
         return Station(s, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
     pieces, i = path.pieces, segment_at(path, s)
@@ -176,8 +183,10 @@ def centreline(path, s):
 
 @jit(forceinline=True)
 def track_frame(path, s, matrix):
-    """The Station at arc length s (m); fills ``matrix`` (3, 3) with the track's frame A = [t n b], Eq. (3), rolled by
-    the cant about t: columns t forward, n left in the canted plane, b up."""
+    """Return the Station at arc length s (m) and fill ``matrix`` (3, 3) with the track's frame A = [t n b], Eq. (3).
+
+    The frame is rolled by the cant about t: columns t forward, n left in the canted plane, b up.
+    """
     station = centreline(path, s)
     tx, ty, tz, level = station.tx, station.ty, station.slope, station.level
     inverse = 1.0 / level
@@ -192,7 +201,10 @@ def track_frame(path, s, matrix):
 
 @jit(inline="always")
 def frame_turn(station):
-    """Turn of the frame per metre: components (1/m) along t, n, b of the vector D with dt/ds = D x t, and so on."""
+    """Return the rotation of the frame per metre of arc length: components (1/m) along t, n, b of the vector D.
+
+    D is defined by dt/ds = D x t, dn/ds = D x n, db/ds = D x b.
+    """
     incline_rate = station.slope_rate / station.level
     along = station.roll_rate + station.curvature * station.slope
     upright = station.curvature * station.level
@@ -202,9 +214,11 @@ def frame_turn(station):
 
 @jit
 def rail_direction(station, y, z, dy, dz):
-    """Slopes towards n and b, over the advance along t, of the line of a rail whose origin lies at y n + z b (m), and
-    that advance per metre of centre line; ``dy`` and ``dz`` are derivatives by s. The twist of a cant ramp is contained
-    in the slopes; the advance is 1 - curvature y on a level curve."""
+    """Return the slopes of a rail's line towards n and b per advance along t, and this advance per metre of s.
+
+    The rail's origin lies at y n + z b (m); ``dy`` and ``dz`` are derivatives with respect to s. The slopes include the
+    twist of a cant ramp. The advance is 1 - curvature y on a level curve.
+    """
     along, left, up = frame_turn(station)
     stretch = 1.0 - up * y + left * z
     return (dy - along * z) / stretch, (dz + along * y) / stretch, stretch
@@ -212,7 +226,7 @@ def rail_direction(station, y, z, dy, dz):
 
 @jit
 def _newton(path, x, y, z, s):
-    """Newton's iteration for (p - r(s)) . t(s) = 0; NaN if it does not settle."""
+    """Solve (p - r(s)) . t(s) = 0 for s (m) by Newton's method; NaN if it does not converge."""
     for _ in range(30):
         p = centreline(path, s)
         dx, dy, dz = x - p.x, y - p.y, z - p.z
@@ -223,14 +237,14 @@ def _newton(path, x, y, z, s):
         s += step
         if not math.isfinite(step):
             break
-        if abs(step) < 1e-6:  # quadratic: what is left is below curvature * step^2
+        if abs(step) < 1e-6:  # quadratic convergence: the error is below curvature * step^2
             return s
     return math.nan
 
 
 @jit
 def _nearest(path, x, y, z):
-    """Arc length of a point close to (x, y, z), from the tangents of all pieces."""
+    """Return the arc length (m) of a point of the path close to (x, y, z), from the tangents of all pieces."""
     best, least = 0.0, math.inf
     n = path.pieces.shape[0]
     for i in range(n):
@@ -248,8 +262,11 @@ def _nearest(path, x, y, z):
 
 @jit
 def arc_length_of(path, x, y, z, guess):
-    """Arc length (m) next to ``guess`` whose cross-section contains a point closer to the path than its radius,
-    (p - r(s)) . t(s) = 0; NaN if there is none. A NaN ``guess``: the whole path is searched first."""
+    """Return the arc length (m) near ``guess`` whose cross-section contains the point: (p - r(s)) . t(s) = 0.
+
+    The point must be closer to the path than the path's radius. The result is NaN if there is no solution. With a NaN
+    ``guess`` the whole path is searched first.
+    """
     if path.pieces.shape[0] == 0:
         return x
     s = _newton(path, x, y, z, guess)

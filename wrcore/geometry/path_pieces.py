@@ -1,7 +1,7 @@
-"""The pieces of a path: stretches on which the centre line is a short power series of the arc length.
+"""Pieces of a path, on which the centre line is a short power series of the arc length.
 
-Each piece is a row: its middle, polynomials of x and y, heading in the middle, and cubics of curvature, sin(roll),
-height and gauge widening, all in the distance from the middle. See :mod:`wrcore.geometry.path`.
+Each piece is a row: arc length of its middle, polynomials of x and y, heading in the middle, and cubics of curvature,
+sin(roll), height and gauge widening, all in the distance from the middle. See :mod:`wrcore.geometry.path`.
 """
 
 import math
@@ -15,25 +15,29 @@ CANT_BASE = 1.5
 """Distance of the rails' running circles over which cant is stated, m (EN 13803 for standard gauge)."""
 
 LARGEST_TURN = 0.04
-"""Largest change of heading within a piece, rad; from its middle 0.02, and 0.02^7 / 7! = 3e-16."""
+"""Largest change of heading within a piece, rad. From the middle it is 0.02, and 0.02^7 / 7! = 3e-16 is the truncation
+error."""
 
 CENTRE, X, Y, HEADING, CURVATURE = 0, 1, 9, 17, 18
 ROLL, RAISE, WIDENING, COLUMNS = 22, 26, 30, 34
-"""Columns of a row at which its parts begin."""
+"""Columns of a row at which the polynomials begin."""
 
 CANT_ABOUT = {
     "lower_rail": lambda cant, curvature: 0.5 * np.abs(cant),
     "inner_rail": lambda cant, curvature: 0.5 * np.where(curvature == 0.0, np.abs(cant), cant * np.sign(curvature)),
     "centreline": lambda cant, curvature: np.zeros_like(cant),
 }
-"""What keeps its height where cant (right rail higher) turns the track, and the centre line's height with it."""
+"""Functions from cant (m, right rail higher) and curvature to the height of the centre line (m), by the line of
+constant height."""
 
 _DEGREE = 7
 
 
 def cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline):
-    """Pieces (n + 1, COLUMNS) of a path, the first straight and without beginning, and the arc lengths (n,) between
-    them (m); the arguments are those of :func:`wrcore.geometry.path.path_data`."""
+    """Return the pieces (n + 1, COLUMNS) of a path and the arc lengths (n,) between them, m.
+
+    The first piece is straight and begins at -inf. The arguments are those of :func:`wrcore.geometry.path.path_data`.
+    """
     curvature, cant, half = np.asarray(curvature, float), np.asarray(cant, float), 0.5 * rounding
     shapes = ["linear"] * (len(knots) - 1) if shapes is None else shapes
     turn = ramps(knots, curvature, shapes, 0.0)
@@ -49,7 +53,10 @@ def cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
 
 
 def _divide(breaks, turn, climbs):
-    """Insert borders so that no derivative of heading or incline makes the series of a piece converge slowly."""
+    """Return ``breaks`` with further borders, so that the power series of each piece converges fast.
+
+    The number of pieces follows from the derivatives of heading and incline.
+    """
     borders = [breaks[:1]]
     for a, b in zip(breaks[:-1], breaks[1:], strict=True):
         _, rate, second, third = np.abs(turn.taylor(0.5 * (a + b)))
@@ -60,7 +67,7 @@ def _divide(breaks, turn, climbs):
 
 
 def _assemble(borders, turn, others, climbs):
-    """Rows of all pieces: straight before the path, each stretch between two borders, and what follows the path."""
+    """Return the rows of all pieces: straight before the path, one between each two borders, and one after the path."""
     before = np.zeros(COLUMNS)
     before[RAISE : RAISE + 4] = sum(climb.taylor(borders[0]) for climb in climbs)
     level = math.sqrt(1.0 - before[RAISE + 1] ** 2)
@@ -84,7 +91,7 @@ def _assemble(borders, turn, others, climbs):
 
 
 def _row(middle, turn, others, climbs):
-    """Row of a piece without its polynomials of x and y."""
+    """Return the row of a piece without its polynomials of x and y."""
     row = np.zeros(COLUMNS)
     row[CENTRE], row[HEADING] = middle, turn.integral(middle)
     for column, part in zip((CURVATURE, ROLL, RAISE, WIDENING), (turn, *others), strict=True):
@@ -95,7 +102,10 @@ def _row(middle, turn, others, climbs):
 
 
 def _plan_series(row):
-    """Power series of x + i y about a piece's middle, up to the constant: integral of cos(incline) e^(i heading)."""
+    """Return the power series of x + i y about a piece's middle, without the constant.
+
+    It is the integral of cos(incline) e^(i heading).
+    """
     series = np.zeros(_DEGREE, complex)
     series[0] = np.exp(1j * row[HEADING])
     for n in range(_DEGREE - 1):
@@ -105,7 +115,7 @@ def _plan_series(row):
 
 
 def _cosine_series(slope):
-    """Power series of sqrt(1 - slope^2) for a polynomial slope, by the recurrence for powers of a series."""
+    """Return the power series of sqrt(1 - slope^2) for a polynomial slope, by the recurrence for powers of series."""
     square = np.zeros(_DEGREE)
     square[: 2 * len(slope) - 1] = -np.convolve(slope, slope)
     square[0] += 1.0

@@ -1,13 +1,14 @@
-"""What changes along a path: curvature, cant, height and widening as cubics between breaks.
+"""Curvature, cant, height and widening along a path, as piecewise cubics.
 
-A quantity goes from one knot's value to the next in one of three shapes over u = 0 to 1:
+A quantity changes from one knot's value to the next in one of three shapes over u = 0 to 1:
 
     linear   u                     curvature: a clothoid
     bloss    3 u^2 - 2 u^3         the cubic Hermite blend of its ends
     cosine   (1 - cos pi u)/2      as a C2 cubic spline of `COSINE_CELLS` cells, within 3e-9 of the change
 
-Linear ramps meet with corners, which are rounded: each one is replaced by its mean under a hat of the rounding length.
-The other shapes begin and end level, without a corner; there the second derivative jumps, as their definitions have it.
+Corners between linear ramps are rounded: the function is replaced by its moving mean with a hat function of the
+rounding length as weight. The other shapes begin and end with zero slope, without a corner; by their definitions the
+second derivative jumps there.
 
 References
 ----------
@@ -21,14 +22,14 @@ from typing import NamedTuple
 import numpy as np
 
 STEEPEST = {"linear": 1.0, "bloss": 1.5, "cosine": 0.5 * math.pi}
-"""Shapes, and their largest slope over the mean one."""
+"""Shapes, with the ratio of their largest to their mean slope."""
 
 COSINE_CELLS = 128
 
 
 @cache
 def blend(shape):
-    """Piecewise cubic from 0 to 1 over 0 to 1 (`scipy.interpolate.PPoly`) of a shape other than linear."""
+    """Return the piecewise cubic (`scipy.interpolate.PPoly`) from 0 to 1 over 0 to 1 of a nonlinear shape."""
     from scipy.interpolate import CubicHermiteSpline, CubicSpline  # not needed where ramps are linear
 
     if shape == "bloss":
@@ -44,28 +45,28 @@ class Broken(NamedTuple):
     values: np.ndarray
 
     def slopes(self):
-        """Slope before each knot and after the last, (k + 1,)."""
+        """Return the slopes (k + 1,) before each knot and after the last."""
         return np.concatenate(([0.0], np.diff(self.values) / np.diff(self.knots), [0.0]))
 
     def corners(self):
-        """Arc lengths and slope jumps of the corners."""
+        """Return arc lengths (m) and slope jumps of the corners."""
         jumps = np.diff(self.slopes())
         real = np.abs(jumps) > 1e-15
         return self.knots[real], jumps[real]
 
     def line(self, s):
-        """Value at s and slope of the straight part around s."""
+        """Return the value at s (m) and the slope of the straight part around s."""
         return np.interp(s, self.knots, self.values), self.slopes()[np.searchsorted(self.knots, s)]
 
     def integral(self, s):
-        """Integral from the first knot to s."""
+        """Return the integral from the first knot to s (m)."""
         i = max(np.searchsorted(self.knots, s) - 1, 0)
         means = 0.5 * (self.values[1:] + self.values[:-1])
         rest = 0.5 * (self.values[i] + self.line(s)[0]) * (s - self.knots[i])
         return np.dot(means[:i], np.diff(self.knots)[:i]) + rest
 
     def taylor(self, s, half):
-        """Taylor coefficients (4,) about s of the function whose corners are rounded over +-half."""
+        """Return the Taylor coefficients (4,) about s (m) of the function with corners rounded over ±half (m)."""
         at, jumps = self.corners()
         near = np.abs(at - s) < half
         if not near.any():
@@ -79,21 +80,23 @@ class Broken(NamedTuple):
 
 
 def rounded_ramp(x, half):
-    """Taylor coefficients of max(x, 0), rounded over +-half (its mean weighted by a hat function)."""
+    """Return the Taylor coefficients of max(x, 0), rounded over ±half (moving mean weighted by a hat function)."""
     return _rounding(x, half) + (np.array([x, 1.0, 0.0, 0.0]) if x > 0.0 else 0.0)
 
 
 def _rounding(x, half):
-    """What rounding adds to max(x, 0), within +-half."""
+    """Return the Taylor coefficients (4,) of the difference that rounding makes to max(x, 0), within ±half."""
     r = half - abs(x)
     sign = -1.0 if x > 0.0 else 1.0
     return np.array([r**3, sign * 3.0 * r**2, 3.0 * r, sign]) / (6.0 * half**2)
 
 
 class Change(NamedTuple):
-    """What a quantity changes by over one segment in a shape other than linear: ``size`` times the shape before
-    ``crossing``, after it ``size_after`` times the shape, towards ``total`` (the fold of a height whose cant changes
-    sign, rounded like a corner)."""
+    """Change of a quantity over one segment in a nonlinear shape.
+
+    It is ``size`` times the shape before ``crossing`` and ends at ``total`` with ``size_after`` times the shape after
+    it. At the crossing, where the cant changes sign, the height has a fold, which is rounded like a corner.
+    """
 
     start: float
     length: float
@@ -104,12 +107,12 @@ class Change(NamedTuple):
     size_after: float = 0.0
 
     def breaks(self, half):
-        """Arc lengths at which the cubic changes."""
+        """Return the arc lengths (m) between which the quantity is one cubic."""
         fold = self.crossing + half * np.array([-1.0, 0.0, 1.0])
         return np.concatenate((self.start + self.length * blend(self.shape).x, fold[np.isfinite(fold)]))
 
     def taylor(self, s, half):
-        """Taylor coefficients (4,) about s."""
+        """Return the Taylor coefficients (4,) about s (m)."""
         u = (s - self.start) / self.length
         if u <= 0.0:
             found = np.zeros(4)
@@ -125,36 +128,38 @@ class Change(NamedTuple):
         return found
 
     def integral(self, s):
-        """Integral up to s of a change without a fold."""
+        """Return the integral up to s (m) of a change without a fold."""
         u = (s - self.start) / self.length
         inner = float(blend(self.shape).antiderivative()(min(max(u, 0.0), 1.0)))
         return self.size * self.length * (inner + max(u - 1.0, 0.0))
 
 
 class Ramps(NamedTuple):
-    """A quantity along the path: linear ramps, whose corners are rounded over +-half, and other changes."""
+    """A quantity along the path: linear ramps with corners rounded over ±half (m), and nonlinear changes."""
 
     linear: Broken
     changes: tuple
     half: float
 
     def breaks(self):
-        """Arc lengths at which the cubic changes."""
+        """Return the arc lengths (m) between which the quantity is one cubic."""
         corners = [self.linear.corners()[0] + shift for shift in (-self.half, 0.0, self.half)]
         return np.concatenate([*corners, *(change.breaks(self.half) for change in self.changes)])
 
     def taylor(self, s):
-        """Taylor coefficients (4,) about s."""
+        """Return the Taylor coefficients (4,) about s (m)."""
         return sum((change.taylor(s, self.half) for change in self.changes), self.linear.taylor(s, self.half))
 
     def integral(self, s):
-        """Integral from the first knot to s."""
+        """Return the integral from the first knot to s (m)."""
         return sum((change.integral(s) for change in self.changes), self.linear.integral(s))
 
 
 def ramps(knots, values, shapes, half):
-    """Ramps between values at knots, both (k,), with the k - 1 ``shapes`` of `STEEPEST`; ``half`` is half the rounding
-    length of corners (m), 0 keeps them."""
+    """Return the Ramps between values at knots, both (k,), with the k - 1 ``shapes`` of `STEEPEST`.
+
+    ``half`` is half the rounding length of corners (m); with 0 they are not rounded.
+    """
     changes = [
         Change(knots[i], knots[i + 1] - knots[i], shapes[i], size, size)
         for i, size in enumerate(np.diff(values))
@@ -164,8 +169,11 @@ def ramps(knots, values, shapes, half):
 
 
 def height(knots, cant, raised, shapes, half):
-    """Height of the centre line, from its values ``raised`` at the knots: between them it changes with the cant, by way
-    of zero where this changes sign, as another rail keeps its height then."""
+    """Return the Ramps of the centre line's height from its values ``raised`` (k,) at the knots, m.
+
+    Between the knots the height changes with the cant. If the cant changes sign, the height is zero there, because the
+    rail of constant height changes.
+    """
     shapes = list(shapes)
     crossed = cant[:-1] * cant[1:] < 0.0
     linear = np.array([shape == "linear" for shape in shapes])
@@ -184,13 +192,13 @@ def height(knots, cant, raised, shapes, half):
 
 
 def _folded(change, knots, cant, raised):
-    """A change of height, folded if the cant changes sign in it."""
+    """Return a change of height, with a fold if the cant changes sign in its segment."""
     k = int(np.searchsorted(knots, change.start, side="right")) - 1
     return _fold(k, knots, cant, raised, change.shape) if cant[k] * cant[k + 1] < 0.0 else change
 
 
 def _fold(k, knots, cant, raised, shape):
-    """The change of height in segment k, in which the cant changes sign."""
+    """Return the change of height in segment k, in which the cant changes sign."""
     from scipy.optimize import brentq
 
     length, change = knots[k + 1] - knots[k], cant[k + 1] - cant[k]
@@ -200,25 +208,27 @@ def _fold(k, knots, cant, raised, shape):
 
 
 def _others(values, shapes):
-    """What shapes other than linear have added up to at each knot."""
+    """Return the accumulated changes (k,) of the nonlinear shapes at the knots."""
     steps = np.where([shape == "linear" for shape in shapes], 0.0, np.diff(values))
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 class Incline(NamedTuple):
-    """Height along gradients that vertical curves join: dz/ds is a broken line (a vertical curve is a parabola, or a
-    circle in short chords) whose corners are rounded over +-half."""
+    """Height along gradients with vertical curves: dz/ds is piecewise linear, with corners rounded over ±half (m).
+
+    A vertical curve is a parabola, or a circle approximated by short linear parts of dz/ds.
+    """
 
     slope: Broken
     half: float
 
     def breaks(self):
-        """Arc lengths at which the cubic changes."""
+        """Return the arc lengths (m) between which the height is one cubic."""
         at = self.slope.corners()[0]
         return np.concatenate((at - self.half, at + self.half))
 
     def taylor(self, s):
-        """Taylor coefficients (4,) of the height about s; 0 at s = 0 if the first gradient reaches there."""
+        """Return the Taylor coefficients (4,) of the height about s (m); the first gradient passes 0 at s = 0."""
         first = self.slope.values[0]
         found = np.array([first * s, first, 0.0, 0.0])
         for corner, jump in zip(*self.slope.corners(), strict=True):
@@ -232,15 +242,17 @@ class Incline(NamedTuple):
 
 
 LARGEST_CHORD = 1e-3
-"""Change of incline, rad, over which dz/ds of a circular vertical curve is straight: its curvature is off by half of
-this times the slope."""
+"""Largest change of incline, rad, over which dz/ds of a circular vertical curve is linear. The relative error of its
+curvature is half of this times the slope."""
 
 
 def incline(lengths, gradients, radii, half, circles=()):
-    """Incline along n gradients (rise over horizontal distance), each over its arc length in ``lengths`` (m; the first
-    begins at 0, the last has no end), with vertical curves of ``radii`` (m) half to either side of a change;
-    ``half``: half the rounding length, m; ``circles`` (n,): where they are circles, not parabolas. Beside it the ends
-    of the vertical curves, (k, 2)."""
+    """Return the Incline along n gradients and the ends (k, 2) of the vertical curves, m.
+
+    ``gradients`` are rise over horizontal distance, each over its arc length in ``lengths`` (m); the first begins at 0,
+    the last has no end. Vertical curves of ``radii`` (m) extend by equal lengths to either side of a change; they are
+    circles if the entry of ``circles`` (n,) is true, else parabolas. ``half`` is half the rounding length, m.
+    """
     angles = np.arctan(np.asarray(gradients, float))
     slopes, changes = np.sin(angles), np.cumsum(np.asarray(lengths, float)[:-1])
     knots, values, ends = [], [], []

@@ -1,6 +1,6 @@
-"""Cubic splines for tables and tracks that most runs have.
+"""Cubic splines for tables and tracks.
 
-They equal scipy's ``CubicSpline``, whose import takes a fifth of the time of a short run.
+They are equal to scipy's ``CubicSpline``, whose import takes a fifth of the time of a short run.
 """
 
 import numpy as np
@@ -9,9 +9,11 @@ from wrcore.kernels.jit import jit
 
 
 def spline_slopes(step, values):
-    """Slopes (n, m) at n >= 4 nodes, ``step`` apart, of the cubic splines through ``values`` (n, m) that are ``not a
-    knot`` at their last nodes but one."""
-    # m[i-1] + 4 m[i] + m[i+1] = right[i]; the third derivative is the same on both sides of the second node
+    """Return the slopes (n, m) at n >= 4 nodes, ``step`` apart, of the cubic splines through ``values`` (n, m).
+
+    The end condition is ``not a knot`` at the second and the last but one node.
+    """
+    # m[i-1] + 4 m[i] + m[i+1] = right[i]; the third derivative is equal on both sides of the second node
     slopes = np.empty(values.shape)
     slopes[1:-1] = 3.0 * (values[2:] - values[:-2]) / step
     slopes[0] = 0.5 * slopes[1] + (2.0 * values[1] - values[0] - values[2]) / step
@@ -27,7 +29,10 @@ def spline_slopes(step, values):
 
 
 def spline_cubics(step, values):
-    """Coefficients (n - 1, 4, m) of those splines, in ascending powers of the distance from a cell's first node."""
+    """Return the coefficients (n - 1, 4, m) of the splines of `spline_slopes`.
+
+    They are in ascending powers of the distance from a cell's first node.
+    """
     slopes, rise = spline_slopes(step, values), np.diff(values, axis=0)
     first, last = step * slopes[:-1], step * slopes[1:]
     powers = [values[:-1], first, 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise]
@@ -35,9 +40,11 @@ def spline_cubics(step, values):
 
 
 def clamped_cubics(x, values):
-    """Return the coefficients (n - 1, 4, m) of the cubic splines through ``values`` (n, m), n >= 2, at increasing
-    ``x`` (n,), whose slopes are zero at both ends, in ascending powers of the distance from a cell's first node. They
-    are bitwise those of ``CubicSpline(x, values, bc_type="clamped")``."""
+    """Return the coefficients (n - 1, 4, m) of the cubic splines through ``values`` (n, m) with zero end slopes.
+
+    The nodes ``x`` (n,), n >= 2, increase. The coefficients are in ascending powers of the distance from a cell's first
+    node and bitwise identical to those of ``CubicSpline(x, values, bc_type="clamped")``.
+    """
     steps = np.diff(x)
     wide = steps[:, None]
     rises = np.diff(values, axis=0) / wide
@@ -53,8 +60,10 @@ def clamped_cubics(x, values):
 
 @jit
 def _solve_tridiagonal(below, diagonal, above, right):
-    """Solve a diagonally dominant tridiagonal system for all columns of ``right`` (n, m), which becomes the solution;
-    ``diagonal`` (n,) is overwritten."""
+    """Solve a diagonally dominant tridiagonal system for all columns of ``right`` (n, m), in place.
+
+    ``right`` becomes the solution; ``diagonal`` (n,) is overwritten.
+    """
     last = len(diagonal) - 1
     for i in range(last):
         factor = below[i] / diagonal[i]
