@@ -1,4 +1,4 @@
-"""The track: where the rails stand."""
+"""The track: gauge, path and irregularity, from a scene's key ``track``."""
 
 import os
 from collections.abc import Callable
@@ -27,19 +27,19 @@ from wrcore.kernels import own
 from wrcore.kernels.named_laws import Laws
 
 SIDES = {"left": 1.0, "right": -1.0}
-"""Sign of a rail's place beside the centre line, along y."""
+"""Sign of the lateral coordinate y of a rail."""
 
 GAUGES = 0.5, 2.0
-"""Gauges of which there are tracks, m; others are taken for another unit."""
+"""Smallest and largest accepted gauge, m; they detect wrong units."""
 
 LEAST_RADIUS = 20.0
-"""Smaller radii are taken for another unit, m."""
+"""Smallest accepted curve radius, m; it detects wrong units."""
 
 STEEPEST_RAMP = 0.01
-"""Cant ramps that are steeper are taken for a mistake, m/m (lines are laid with at most a quarter of it)."""
+"""Largest accepted slope of a cant ramp, m/m; real lines have at most a quarter of it."""
 
 MOST_SAMPLES = 2_000_000
-"""More samples of a generated irregularity take too much memory."""
+"""Largest number of samples of a generated irregularity, which limits memory."""
 
 _KINDS = ("tangent", "transition", "curve")
 _SEGMENT_KEYS = {
@@ -51,12 +51,12 @@ _SYNONYMS = {"hermite": "bloss"}
 
 
 WIDENED = {"both": 0.0, "left": 0.5, "right": -0.5}
-"""Part of the widening by which the middle of both rails moves to the left, by which of them has it."""
+"""Fraction of the widening by which the middle between the rails moves to the left, by the rails that are widened."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A track with two rails of the same profile; by default straight, level and perfect."""
+    """A track: gauge, path and irregularity; by default straight, level and without irregularity."""
 
     gauge: float = 1.435
     """Distance of the rails' innermost points within the gauge depth of their tops, m; the path's widening is added."""
@@ -67,7 +67,7 @@ class Track:
     gauge_depth: float = GAUGE_DEPTH
     """Height below the rail top down to which the gauge is measured, m."""
     by_law: Callable | None = field(default=None, repr=False)
-    """Irregularity of a law of the user, which is not called yet: a function of `Laws` to IrregularityData."""
+    """Irregularity from a user-defined law that has not been called: a function from `Laws` to IrregularityData."""
 
     @cached_property
     def tangent(self):
@@ -76,16 +76,17 @@ class Track:
         return self.path.pieces.shape[0] == 0 and bare
 
     def with_laws(self, laws):
-        """The track with the irregularity of a law of the user; itself if it has none."""
+        """Return the track with the irregularity of its user-defined law added; without a law, the track itself."""
         if self.by_law is None:
             return self
         return replace(self, irregularity=sum_of([self.irregularity, self.by_law(laws)]), by_law=None)
 
     def rail_distance(self, rail):
-        """Distance (m) from the track's centre line to the origin (highest point) of a rail's ProfileCurve in track
-        pose; InputError for a rail that ends above the gauge depth.
+        """Return the distance (m) from the track's centre line to the origin (highest point) of a rail's profile.
 
-        Its part of the widening, half unless the path says otherwise, and the irregularity come on top."""
+        ``rail`` is a ProfileCurve with its inclination in the track. Widening and irregularity are not included. An
+        InputError is raised for a rail that ends above the gauge depth.
+        """
         offset = rail.gauge_offset(self.gauge_depth)
         if not np.isfinite(offset):
             expected = (
@@ -96,9 +97,12 @@ class Track:
 
 
 def build_track(data, source, folder=".", laws=None):
-    """Track of a scene's key ``track`` (a dict, left as it is); ``source`` is named in errors, a points file is looked
-    for in ``folder``, then above it, and ``laws`` find a law of the user, which is not called. InputError names a
-    segment by its position in the list (from 0) and its key."""
+    """Return the Track of a scene's key ``track`` (a dict, which is not changed).
+
+    ``source`` is named in errors. Files of points are searched in ``folder``, then in the folder above. ``laws`` finds
+    a user-defined law, which is not called. An InputError names a segment by its index in the list (from 0) and its
+    key.
+    """
     try:
         data = validate(data, "track", source)
     except InputError as error:
@@ -124,7 +128,10 @@ def build_track(data, source, folder=".", laws=None):
 
 
 def _knots(segments, rounding, source):
-    """Arc lengths of the joints; curvature, cant (right rail higher) and widening there; and the segments' shapes."""
+    """Return the arc lengths (m) of the segments' ends, the values there (3, k) and the segments' shapes.
+
+    The values are curvature (1/m), cant (m, right rail higher) and widening (m).
+    """
     kinds = [_kind(i, segment, source) for i, segment in enumerate(segments)]
     followers = [*kinds[1:], ""]
     values = [_values(i, *item, source) for i, item in enumerate(zip(kinds, segments, followers, strict=True))]
@@ -144,6 +151,7 @@ def _knots(segments, rounding, source):
 
 
 def _kind(i, segment, source):
+    """Return the kind of a segment; InputError for several kinds or keys that do not belong to it."""
     kinds = [kind for kind in _KINDS if kind in segment]
     if len(kinds) != 1:
         raise InputError(source, f"track.path.{i}", f"expected one of {', '.join(_KINDS)}, got {sorted(segment)}")
@@ -156,9 +164,9 @@ def _kind(i, segment, source):
 
 
 def _values(i, kind, segment, after, source):
-    """Curvature, cant and widening at the end of a segment; None for a transition to those of the next one.
+    """Return curvature, cant and widening at the end of a segment; None for a transition to those of the next segment.
 
-    A transition with cant or widening alone ends in a straight line; `_completed` gives its cant a sign."""
+    A transition with cant or widening but no radius ends in a straight line; `_completed` sets the sign of its cant."""
     own = [key for key in ("radius", "cant", "widening") if key in segment]
     if kind == "tangent":
         return np.zeros(3)
@@ -180,10 +188,10 @@ def _values(i, kind, segment, after, source):
 
 
 def _completed(values, kinds, segments, source):
-    """Values at the ends of segments, with those of transitions that lead to another transition or end the path.
+    """Return the values at the ends of segments, completed for transitions before another transition or at the end.
 
-    Between curves to either side they are zero, an inflection. A cant without a radius, on straight track, raises the
-    rail that is higher before, or else the outer one of the next curve."""
+    Between curves of opposite direction the values are zero (inflection). Cant on straight track, without a radius,
+    raises the rail that is higher before it, or else the outer rail of the next curve."""
     found = list(values)
     for i in [k for k, segment in enumerate(segments) if kinds[k] == "transition" and "radius" not in segment]:
         before = found[i - 1] if i else np.zeros(3)
@@ -207,7 +215,7 @@ def _completed(values, kinds, segments, source):
 
 
 def _jump(kind, change, rounding):
-    """What is expected where curvature, cant or widening would jump."""
+    """Return the error text for a jump of curvature, cant or widening."""
     expected = f"expected a transition before this {kind}: curvature, cant or widening would jump"
     if not np.any(change[1:]):
         expected += f"; where the radius is so large that the line has none, write {{transition: {rounding:g}}}"
@@ -215,6 +223,7 @@ def _jump(kind, change, rounding):
 
 
 def _check_ramp(i, segment, change, shape, rounding, source):
+    """Raise an InputError for a transition shorter than the rounding length or with a too steep cant ramp."""
     field_name, length = f"track.path.{i}.transition", segment["transition"]
     if shape == "linear" and np.any(change[1:] != 0.0) and length < rounding:
         expected = f"expected at least the rounding length of {rounding:g} m where cant or widening changes"
@@ -225,7 +234,7 @@ def _check_ramp(i, segment, change, shape, rounding, source):
 
 
 def _incline(gradients, rounding, source):
-    """Height along the key ``track.gradients``."""
+    """Return the `Incline` of the key ``track.gradients``."""
     last = len(gradients) - 1
     for i, item in enumerate(gradients):
         for key, needed in (("length", i < last), ("radius", i > 0)):
@@ -246,7 +255,7 @@ def _incline(gradients, rounding, source):
 
 
 def _irregularity(data, source, folder, gauge):
-    """IrregularityData of the key ``track.irregularity``; an absolute gauge is measured from ``gauge`` (m)."""
+    """Return the IrregularityData of ``track.irregularity``; ``gauge`` (m) is subtracted from absolute gauges."""
     key = "track.irregularity"
     if not data.keys() & {"points", "spectrum", "own"}:
         raise InputError(source, key, "expected points, spectrum or own")
@@ -268,7 +277,7 @@ def _irregularity(data, source, folder, gauge):
 
 
 def _by_law(data, source, laws, call=True):
-    """IrregularityData of a law of the user, or None where it is not to be called."""
+    """Return the IrregularityData of a user-defined law, or None if ``call`` is False."""
     key = "track.irregularity"
     s, values = own.on_grid(data["own"], len(CHANNELS), laws, source, f"{key}.own", call)
     if values is None:
@@ -280,6 +289,7 @@ def _by_law(data, source, laws, call=True):
 
 
 def _generated(data, source, key):
+    """Return arc lengths (m) and deviations (n, 4), m, of the key ``track.irregularity.spectrum``."""
     if data["shortest"] >= data["longest"]:
         expected = f"expected more than the shortest wavelength of {data['shortest']:g} m"
         raise InputError(source, f"{key}.longest", f"{expected}, got {data['longest']!r}")
@@ -295,9 +305,9 @@ def _generated(data, source, key):
 
 
 def rotation(roll, yaw):
-    """Rotation matrix of a wheelset's frame: first roll about x, then yaw about z, shape (3, 3).
+    """Return the rotation matrix (3, 3) of a wheelset's frame: first roll about x, then yaw about z, rad.
 
     The second column is the axle's direction, (-sin yaw cos roll, cos yaw cos roll, sin roll). The wheelset's
-    pitch is left out: it does not move the wheel's surface."""
+    pitch is not included: it does not move the surface of a round wheel."""
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     return np.array([[cy, -sy * cr, sy * sr], [sy, cy * cr, -cy * sr], [0.0, sr, cr]])

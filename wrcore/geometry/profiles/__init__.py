@@ -1,1 +1,1 @@
-"""Profiles of wheels and rails: named ones, files of points, checks, smoothing."""
+"""Profiles of wheels and rails: named profiles, point files, checks, smoothing."""

@@ -1,8 +1,8 @@
-"""Whether measured points are a believable wheel or rail: its directions, its origin, its unit.
+"""Plausibility checks of measured wheel and rail points: directions, origin and unit.
 
-The shape shows most mistakes of signs and origins. A wheel has a flange at its inner end, which falls (f is positive
-up), and its tape circle on the tread. A rail's head falls at both ends and does not lean away from the track's centre.
-What is not believable is refused with the key that mends it.
+The shape shows most errors of signs and origins. A wheel has a flange at its inner end, which points down (f is
+positive upwards), and its tape circle on the tread. A rail's head falls at both ends and does not lean away from the
+track's centre. Implausible points raise an InputError that names the key to correct.
 """
 
 from typing import NamedTuple
@@ -13,57 +13,59 @@ from wrcore.errors import InputError
 from wrcore.kernels.cache import warn
 
 LARGEST, SMALLEST = 1.0, 5e-3
-"""Profiles are neither wider nor narrower than this, m."""
+"""Largest size and smallest width of a profile, m; they detect wrong units."""
 
 UNITS = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 1e-2, "um": 1e-6}
-"""m per unit of a profile file; of two units that fit, the first one is guessed."""
+"""Length of the units of profile files, m. If a profile fits several units, the first of them is guessed."""
 
-_NARROW = 0.02  # m; narrower ones are scaled, parts, or files in cm that were read in mm
+_NARROW = 0.02  # m; narrower profiles are scaled, parts, or files in cm that were read in mm
 _WIDTHS = {"wheel": (0.05, 0.18), "rail": (0.03, 0.1)}  # m, of files in the right unit
-_TREAD = 0.35  # the tread, and a rail's head, is the widest part that is less steep
+_TREAD = 0.35  # the tread, or a rail's running surface, is the widest part with smaller slopes
 _ON_TREAD = 0.5  # slope at the tape circle of a wheel; flanks have 1 and more
-_FLANGE = 4e-3  # m; what falls less beside the tread is no flange
-_CERTAIN = 12e-3  # m; what falls or rises more is one, whatever is stated
-_STRAIGHT = 3e-4  # m; treads without a flange that bend less are cones and cylinders
+_FLANGE = 4e-3  # m; smallest height of a flange beside the tread
+_CERTAIN = 12e-3  # m; a larger fall or rise beside the tread is a flange, even if stated directions differ
+_STRAIGHT = 3e-4  # m; treads without a flange that deviate less from a line are cones and cylinders
 _VERTICAL = 6.0  # slope of 80 degrees: flanges of wheels have 70 to 76, sides of rails 87
 _STEP = 5e-4  # m
-_FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
-_SIDES = 12e-3, 8e-3  # m below a rail's top: its sides, and the least depth that shows them
+_FALSE_FLANGE = 5e-3  # m; largest height of a worn tread above its field side
+_SIDES = 12e-3, 8e-3  # m below a rail's top: depth at which its sides are compared, and the smallest such depth
 _OPEN = 4e-3  # m; half a head falls less than this at its open end
 _STEEP = 0.7  # slope; sides of rails and flanges of wheels are steeper, a circle of 300 mm reaches it at 172 mm
-_SIDE_MARGIN, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
+_SIDE_MARGIN, _DEEP = 15e-3, 40e-3  # m; largest extent of a rail beyond its sides, down to this depth
 _OUTWARD = (
     1.0 / 55.0
 )  # rails lean towards the track's centre by 1/20 to 1/40 or stand upright; worn ones seem to lean less
 
 
 class Mends(NamedTuple):
-    """What a person changes where points are read otherwise than they were meant."""
+    """Advice in messages: the keys to change if points are read with wrong directions, origin or unit."""
 
     u: str = "u with the other sign"
     f: str = "f with the other sign"
     origin: str = "u from the tape circle"
     unit: str = "u and f in m"
-    """Said of a unit, which stands in place of {}."""
+    """Advice for a wrong unit; {} is replaced by the likely unit."""
     any_shape: str = "mends=False"
-    """Reads a wheel without a flange."""
+    """Advice to read a wheel without a flange."""
     factor: float = 1.0
-    """m per unit of the file."""
+    """Length of the file's unit, m."""
     is_stated: bool = False
-    """Whether both directions are stated by a person, not assumed."""
+    """Whether the user stated both directions, so that they are not assumed."""
     is_side_stated: bool = False
-    """Whether the direction of u is."""
+    """Whether the user stated the direction of u."""
 
 
 def likely_unit(span, kind):
-    """Unit in which numbers that span so much across are a wheel or a rail; None if there is none."""
+    """Return the unit in which a lateral extent ``span`` is that of a wheel or rail; None if there is none."""
     low, high = _WIDTHS[kind]
     return next((unit for unit, factor in UNITS.items() if low <= span * factor <= high), None)
 
 
 def check_extent(u, f, kind, name, mends):
-    """Refuse points (m) wider or higher than `LARGEST` or narrower than `SMALLEST`; the message names the unit in which
-    they would be a ``kind``."""
+    """Raise an InputError for points (m) wider or higher than `LARGEST` or narrower than `SMALLEST`.
+
+    The message names the unit in which they would be a ``kind``.
+    """
     width, height = np.ptp(u), np.ptp(f)
     if width >= SMALLEST and max(width, height) <= LARGEST:
         if width < _NARROW and likely_unit(width / mends.factor, kind) == "cm":
@@ -83,7 +85,7 @@ def check_extent(u, f, kind, name, mends):
 
 
 def check_wheel(u, f, name, mends):
-    """Refuse points u, f (m, in order of increasing u) that are no wheel in the package's axes."""
+    """Raise an InputError if points u, f (m, in order of increasing u) are no wheel in the package's axes."""
     if not u.min() < 0.0 < u.max():
         got = f"got it outside, u from {u.min():.4g} to {u.max():.4g} m: {mends.origin}"
         raise InputError(name, "points", f"expected u = 0 (tape circle) inside a wheel profile, {got}")
@@ -126,7 +128,10 @@ def check_wheel(u, f, name, mends):
 
 
 def check_rail(u, f, name, mends):
-    """Refuse points u, f (m, in order of increasing u, in track pose) that are no rail in the package's axes."""
+    """Raise an InputError if points u, f (m) are no rail in the package's axes.
+
+    The points are in order of increasing u, with the rail's inclination in the track.
+    """
     top = int(np.argmax(f))
     if top in (0, f.size - 1):
         low = int(np.argmin(f))
@@ -151,8 +156,10 @@ def check_rail(u, f, name, mends):
 
 
 def check_sides(u, f, name):
-    """Refuse points of a rail that lie beside its head, where neither its sides nor its foot are. A curve that is
-    nowhere steep has no sides: rails of roller rigs and of tests are circles."""
+    """Raise an InputError for points of a rail that lie laterally outside its head.
+
+    A curve without steep parts is not checked, as it has no sides: rails of roller rigs and of tests are circles.
+    """
     top = int(np.argmax(f))
     slopes = np.abs(np.diff(f)) / np.maximum(np.abs(np.diff(u)), 1e-9)
     if np.max(slopes[f[1:] > f[top] - _DEEP], initial=0.0) < _STEEP:
@@ -167,14 +174,16 @@ def check_sides(u, f, name):
 
 
 def _side(u, f, top, step, depth):
-    """Abscissa at which a head is first so deep on one side of its top; None where it is nowhere."""
+    """Return the abscissa (m) of the first point of a head at ``depth`` (m) below its top on one side, or None."""
     reached = f[top] - f[top::step] >= depth * (1.0 - 1e-9)
     return float(u[top::step][np.argmax(reached)]) if reached.any() else None
 
 
 def _tread(u, f):
-    """Uniform abscissae without the ends, where side faces are, heights there, and the ends of the widest part that is
-    no steeper than a tread."""
+    """Return uniform abscissae (m), heights there (m), and the end indices of the widest part with a tread's slope.
+
+    The ends of the profile, which may be side faces, are left out.
+    """
     ahead = np.flatnonzero(np.append(True, u[1:] > np.maximum.accumulate(u)[:-1]))
     width = u[ahead[-1]] - u[ahead[0]]
     at = np.linspace(u[ahead[0]] + 0.01 * width, u[ahead[-1]] - 0.01 * width, 120)
@@ -188,15 +197,15 @@ def _tread(u, f):
 
 
 def _has_steep_side(u, f, inner):
-    """Whether points further in than ``inner`` (m) rise outwards as steeply as the side of a rail, over `_STEP`."""
+    """Whether points inside the abscissa ``inner`` (m) rise outwards as steeply as a rail's side, over `_STEP`."""
     length = np.append(0.0, np.hypot(np.diff(u), np.diff(f)).cumsum())
-    at = np.arange(0.0, length[-1], _STEP)  # rounded points close together may be steep
+    at = np.arange(0.0, length[-1], _STEP)  # a coarse step, as rounding makes points close together steep
     across, up = np.diff(np.interp(at, length, u)), np.diff(np.interp(at, length, f))
     return bool(np.any((up > _VERTICAL * np.abs(across)) & (np.interp(at[1:], length, u) <= inner)))
 
 
 def _ends(height, first, last):
-    """How far the profile falls and rises beyond its tread, m."""
+    """Return the heights (m) by which the profile falls and rises beyond its tread, on the inner and outer side."""
     inner, outer = height[: first + 1], height[last:]
     return {
         "inner fall": height[first] - inner.min(), "inner rise": inner.max() - height[first],

@@ -1,8 +1,8 @@
-"""ProfileCurve: a wheel or rail profile as every later stage sees it.
+"""ProfileCurve: the representation of a wheel or rail profile in all calculations.
 
-Positions and slopes at the nodes are those of the exact sections; between them runs a cubic Hermite polynomial. The
-curvature is kept apart from the geometry: sections meet with curvature jumps, which Hertz' theory cannot use, so the
-curvature is averaged along the profile while position and slope stay exact.
+Positions and slopes at the nodes are those of the exact sections; between the nodes the profile is a cubic Hermite
+polynomial. The curvature is stored separately: it jumps between sections, which Hertz' theory cannot represent. So the
+curvature is averaged along the profile, while position and slope are exact.
 """
 
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ WINDOW = 1e-3
 """Default length along the profile over which the curvature is averaged, m."""
 
 STEEPEST = 10.0
-"""The curve ends where its slope exceeds this (84 degrees): beyond, f(u) is no useful description."""
+"""Largest slope of a curve (84 degrees), at which it ends: f(u) is not suitable for steeper parts."""
 
 GAUGE_DEPTH = 0.014
 """Depth below the highest point at which the gauge is measured, m (CONTACT user guide, Manchester example)."""
@@ -28,20 +28,22 @@ GAUGE_DEPTH = 0.014
 
 @dataclass(frozen=True, eq=False)
 class ProfileCurve:
-    """Wheel or rail profile f(u), both in m: u to the field side, f up."""
+    """Wheel or rail profile f(u), both in m: u positive to the field side, f positive upwards."""
 
     name: str
     kind: str
-    """Of a "wheel" f = 0 at the tape circle (u = 0), radius r(u) = r0 - f(u); of a "rail", as it lies in the track,
-    f(0) = 0 is the highest point."""
+    """Kind of profile: for a "wheel" f = 0 at the tape circle (u = 0) and the radius is r(u) = r0 - f(u); for a "rail",
+    with its inclination in the track, f(0) = 0 is the highest point."""
     u: np.ndarray
-    """Nodes, m, (n,), increasing and uniform."""
+    """(n,): nodes, m, increasing and uniform."""
     f: np.ndarray
+    """(n,): heights at the nodes, m."""
     df: np.ndarray
-    """Slope at the nodes."""
+    """(n,): slopes at the nodes."""
     d2f: np.ndarray
-    """Second derivative that belongs to the averaged curvature, 1/m (see `averaged_second_derivative`)."""
+    """(n,): second derivative from the averaged curvature, 1/m (see `averaged_second_derivative`)."""
     source: str = ""
+    """Origin of the profile."""
     outline: object = field(default=None, repr=False)
     """Exact sections (tuple) or `profile_points.Outline`; used for the gauge only."""
 
@@ -51,9 +53,11 @@ class ProfileCurve:
 
     @classmethod
     def from_sections(cls, name, kind, sections, source="", window=WINDOW, spacing=SPACING):
-        """Curve through exact sections (Arc, Line or Polynomial) in order of increasing u (m), those of rails in track
-        pose (`profile_sections.incline`); ``window``: averaging length of the curvature, m; ``spacing``: distance of
-        the nodes, m; u = 0 is a node."""
+        """Return the curve of exact sections (Arc, Line or Polynomial) in order of increasing u (m).
+
+        Sections of rails have their inclination in the track (`profile_sections.incline`). ``window`` is the averaging
+        length of the curvature, m; ``spacing`` is the distance of the nodes, m; u = 0 is a node.
+        """
         low, high, used = profile_sections.usable_span(sections, STEEPEST)
         u = _nodes(low, high, spacing)
         f, df = profile_sections.evaluate(used, u)
@@ -62,14 +66,16 @@ class ProfileCurve:
     @classmethod
     def from_points(cls, u, f, kind, name="points", *, lines=None, trim=False, inclination=0.0, smoothing=0.0,
                     window=WINDOW, spacing=SPACING, mends=None):  # fmt: skip
-        """Curve through measured points u, f (m), u strictly rising or falling: a parametric cubic spline (C2 along the
-        profile) without their noise of standard deviation ``smoothing`` (m), sampled at uniform nodes (see
-        `from_sections`).
+        """Return the curve through measured points u, f (m), u strictly increasing or decreasing.
 
-        Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
-        stays) after a turn by ``inclination`` (0: they lie in track pose). ``trim`` keeps the single-valued portion
-        around the origin instead of refusing a profile that turns back. ``name``, the points' ``lines`` in a file and
-        ``mends`` (`wrcore.geometry.profiles.checks.Mends`) are for messages; False takes points of any shape."""
+        A parametric cubic spline (C2 along the profile) is fitted and sampled at uniform nodes (see `from_sections`).
+        Noise of the standard deviation ``smoothing`` (m) is removed.
+
+        Wheels are shifted vertically to f(0) = 0. Rails are rotated by ``inclination`` (0 for points with the
+        inclination in the track) and shifted to their highest point; an origin within 0.2 um of its height is kept.
+        ``trim`` keeps the single-valued part around the origin; without it a profile that turns back is an error.
+        ``name``, the points' ``lines`` in a file and ``mends`` (`wrcore.geometry.profiles.checks.Mends`) are for
+        messages; with ``mends=False`` points of any shape are accepted."""
         outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing, mends)
         low, high = outline.working_span(STEEPEST, trim)
         nodes = _nodes(low, high, spacing)
@@ -78,7 +84,7 @@ class ProfileCurve:
         return cls(name, kind, nodes, value, slope, d2f, f"measured points, {name}", outline)
 
     def __call__(self, u, nu=0):
-        """Ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m, any shape); NaN beyond the ends.
+        """Return ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m); NaN beyond the ends.
 
         Ordinate and slope are those of the cubic Hermite polynomial, the second derivative is interpolated linearly."""
         u = np.asarray(u, dtype=float)
@@ -105,8 +111,10 @@ class ProfileCurve:
         return (self.u[-1] - self.u[0]) / (self.u.size - 1)
 
     def gauge_offset(self, depth=GAUGE_DEPTH):
-        """Distance (m, positive) from a rail's origin to its innermost point within ``depth`` (m) of the top; NaN if
-        the profile ends above that depth on the gauge side. InputError for a wheel."""
+        """Return the distance (m, positive) from a rail's origin to its innermost point within ``depth`` of the top.
+
+        The result is NaN if the profile ends above that depth (m) on the gauge side. InputError for a wheel.
+        """
         if self.kind != "rail":
             raise InputError(self.name, "gauge", "expected a rail profile, got a wheel")
         if isinstance(self.outline, profile_points.Outline):
@@ -115,21 +123,24 @@ class ProfileCurve:
 
     @property
     def gauge_offset_m(self):
-        """`gauge_offset` at the usual depth of 14 mm, m; NaN for a wheel."""
+        """Distance `gauge_offset` at the usual depth of 14 mm, m; NaN for a wheel."""
         return self.gauge_offset() if self.kind == "rail" else float("nan")
 
 
 def _nodes(low, high, spacing):
-    """Multiples of ``spacing`` from ``low`` to ``high`` (m); the small slack keeps ends that are multiples."""
+    """Return the multiples of ``spacing`` from ``low`` to ``high`` (m), including ends that are multiples but for
+    rounding."""
     return spacing * np.arange(np.ceil(low / spacing - 1e-9), np.floor(high / spacing + 1e-9) + 1)
 
 
 def averaged_second_derivative(u, f, df, window=WINDOW):
-    """Second derivative (1/m) at nodes u, f (m) with slopes df, all (n,), that reproduces the curvature's mean over the
-    arc length ``window`` (m) centred there: the turn of the tangent over it, divided by it; cut off at the ends.
+    """Return the second derivative (n,), 1/m, that corresponds to the mean curvature over an arc length ``window`` (m).
 
-    It is f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature f'' / (1 + f'^2)^(3/2) is the mean. On a circular
-    arc this is exact also where the arc is steep, where the mean of f'' over u is not."""
+    ``u``, ``f`` (m) and the slopes ``df`` are values at nodes, all (n,). The mean curvature is the change of the
+    tangent's angle over the window centred at the node, divided by its length; at the ends the window is shortened.
+
+    The result is f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature f'' / (1 + f'^2)^(3/2) is the mean. On a
+    circular arc it is exact for any slope, unlike the mean of f'' over u."""
     if not window > 0.0:
         raise ValueError(f"window must be positive, got {window!r}")
     angle = np.arctan(df)

@@ -1,26 +1,30 @@
-"""Noise of measured points evened out: the curve follows the points as closely as their noise says.
+"""Smoothing of measured profile points with a stated standard deviation of their noise.
 
-It is the most probable curve where the change of curvature along the profile is random and as large as it is nearby:
-arcs are smoothed over long distances, transitions between them over short ones. All steps are smooth in the noise that
-is stated, so that a little more or less of it makes little difference.
+The result is the most probable curve if the change of curvature along the profile is random, with a standard deviation
+estimated nearby. So arcs are smoothed over long distances and transitions between them over short distances. The result
+depends smoothly on the stated noise, so that a small error of it has a small effect.
 """
 
 import numpy as np
 
 CHANGE, LEAST_CHANGE = 3000.0, 200.0
-"""Change of curvature along a profile, 1/m^2, where nothing is known: from 0 to that of a flange root (13 mm) within
-some 25 mm; and the least that is believed, 1/m within 5 mm."""
+"""Initial and smallest change of curvature along a profile, 1/m^2. Initial: from 0 to that of a flange root (radius
+13 mm) within some 25 mm; smallest: 1/m within 5 mm."""
 
 LENGTH = 5e-4
-"""Length along the profile, m, beyond which changes of curvature are independent of each other."""
+"""Correlation length of the changes of curvature along the profile, m."""
 
 NEARBY, ROUNDS = 1e-3, 6
-"""How far changes of curvature are compared along the profile, m, to each side, and how often."""
+"""Distance along the profile, m, to each side over which the change of curvature is averaged, and number of iterations.
+"""
 
 
 def even_out(at, points, noise):
-    """``points`` (n, 2), m, at the lengths ``at`` (n,), m, without their noise, whose standard deviation in each
-    direction is ``noise`` (m); LinAlgError where points lie too close together for so much of it."""
+    """Return smoothed ``points`` (n, 2), m, at the lengths ``at`` (n,), m, along the profile.
+
+    ``noise`` (m) is the standard deviation of the points' noise in each direction. A LinAlgError is raised if points
+    are too close together for this noise.
+    """
     from scipy.linalg import cho_solve_banded, cholesky_banded
 
     count = at.size - 3
@@ -39,7 +43,7 @@ def even_out(at, points, noise):
                 bands[j - k, k : count + k] += stiffness * weights[k] * weights[j]
         factor = cholesky_banded(bands, lower=True), True
         even = cho_solve_banded(factor, points)
-        for _ in range(2):  # points close together: the first solution has lost digits
+        for _ in range(2):  # iterative refinement: for points close together the first solution is inaccurate
             bent = stiffness[:, None] * _derive(weights, even)
             missing = points - even
             for k in range(4):
@@ -51,12 +55,13 @@ def even_out(at, points, noise):
 
 
 def _derive(weights, points):
+    """Return the third derivative (n - 3, 2) of points along the profile with the weights of `_third_derivative`."""
     count = weights.shape[1]
     return sum(weights[k][:, None] * points[k : count + k] for k in range(4))
 
 
 def _third_derivative(at):
-    """Weights (4, n - 3) of four points in a row in the third derivative between them."""
+    """Return the weights (4, n - 3) of four successive points in the third derivative between them."""
     count = at.size - 3
     parts = [at[k : count + k] for k in range(4)]
     return 6.0 / np.stack([np.prod([parts[k] - parts[j] for j in range(4) if j != k], axis=0) for k in range(4)])
