@@ -1,12 +1,11 @@
-"""Profile files: CSV or columns of points, SIMPACK .prw/.prr, profile meters, Vampire. All conversions to the package's
-axes happen here.
+"""Profile files: CSV or columns of points, SIMPACK .prw/.prr, profile meters, Vampire; conversion to wrcore's axes.
 
-Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#``, ``%`` or ``!``
-starts a comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns
-may be separated by commas, semicolons, tabs or blanks; beside semicolons and tabs numbers may have decimal commas.
-Further columns are not read; a header names them all. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
-convention without a header: declare ``unit: mm``. Lines ``Name=value`` before the points are passed over; in which
-directions the columns count, and from where, is declared beside the path: ``mirrored``, ``downwards``, ``shift``.
+Point files list u (lateral, positive to the field side) and f (positive up), one point per line; ``#``, ``%`` or ``!``
+starts a comment. The unit is in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared with the path. Columns may
+be separated by commas, semicolons, tabs or blanks; with semicolons and tabs numbers may have decimal commas. Further
+columns are not read; a header names all columns. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
+convention without a header: declare ``unit: mm``. Lines ``Name=value`` before the points are ignored. Directions and
+origin of the columns are declared with the path: ``mirrored``, ``downwards``, ``shift``.
 
 SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down). MiniProf and
 Vampire: `wrcore.geometry.profiles.meters`.
@@ -36,22 +35,23 @@ _KEYS = {
 }  # fmt: skip
 _INSTEAD = {"tape_circle": ("shift", "flange_back")}
 _FACE, _BACK = 2e-3, 5e-3
-"""Points this near to a wheel's innermost one are its flange back, m, if they rise so far above the flange's tip, m."""
+"""Points within the first distance (m) of a wheel's innermost point are its flange back, if they rise by the second
+distance (m) above the flange's tip."""
 _REASONS = "side faces, too deep, stepping back, equal, not within"
 _HEADED = "; a header above them is u_m,f_m or u_mm,f_mm: u to the field side, f up"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
 def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
-    """ProfileCurve of a ``kind`` from the path of a point file, or from a dict of ``points`` (the path) and how to read
-    it; its ``source`` says what was read, turned and left out.
+    """Read the ProfileCurve of a ``kind`` from a point file; its ``source`` lists points read, rotated and left out.
 
-    Keys: ``unit`` (m, mm, inch, cm or um); ``inclined`` (default True): a rail's points lie in the track pose already,
-    else ``inclination`` turns them; ``smoothing`` (m); ``within`` (m, 2): abscissae, as the file has them, between
-    which points are read. What a SIMPACK file states itself: ``mirrored``: the first column counts towards the track's
-    centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that. Where a wheel's u
-    = 0 is: ``tape_circle`` (m), its distance from the file's origin, or ``flange_back`` (m), its distance from the
-    innermost point. ``part``: of a MiniProf file of several; ``side`` (left or right) of a Vampire file."""
+    ``spec`` is the path or a dict. Keys: ``points`` (the path); ``unit`` (m, mm, inch, cm or um); ``inclined`` (default
+    True): a rail's points have the inclination in the track, else they are rotated by ``inclination``; ``smoothing``
+    (m); ``within`` (m, 2): abscissae in the file between which points are read. Not for SIMPACK files, which state
+    them: ``mirrored``: the first column is positive towards the track's centre; ``downwards``: the second column is
+    positive downwards; ``shift`` (m, 2): then added to u and f. Position of a wheel's u = 0: ``tape_circle`` (m), its
+    distance from the file's origin, or ``flange_back`` (m), its distance from the innermost point. ``part``: number of
+    a MiniProf file's part; ``side`` (left or right) of a Vampire file."""
     spec = spec if isinstance(spec, dict) else {"points": spec}
     u, f, lines, inside, stated, told, assumed = read_points(spec, kind)
     path = Path(spec["points"])
@@ -72,9 +72,11 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
 
 
 def read_points(spec, kind):
-    """Points u (to the field side) and f (up), m, as `read_profile` reads them from a dict, before they are placed in
-    the track; the line number of each line with a point, which of them are inside ``within``, what the file states,
-    what was done, and which keys were assumed."""
+    """Read points u (to the field side) and f (up), m, with the keys of `read_profile`, before the rail is inclined.
+
+    Further results: the number of each line with a point, a mask of the points inside ``within``, the `Stated` of the
+    file, a text of the conversions, and the names of assumed keys.
+    """
     spec = _checked(spec, kind)
     path = Path(spec["points"])
     u, f, lines, stated = _read(path, read_text(path, "a readable profile file"), spec, kind)
@@ -85,12 +87,12 @@ def read_points(spec, kind):
 
 
 def kind_of(path):
-    """The kind of profile that the ending of a file's name says; None where it says none."""
+    """Return the kind of profile that belongs to the ending of a file's name, or None."""
     return _KIND_OF.get(Path(path).suffix.lower())
 
 
 def _read(path, text, spec, kind):
-    """Points (n,) in m as a file has them, the lines of each, and what the file states of them."""
+    """Return a file's points (n,) in m in the file's axes, the line number of each, and the file's `Stated`."""
     ending, unit = path.suffix.lower(), spec.get("unit")
     origin = "tape_circle, flange_back or shift says where it is"
     shape = "state mirrored and downwards, true or false"
@@ -122,7 +124,7 @@ def _read(path, text, spec, kind):
 
 
 def _within(path, spec, u):
-    """Which points lie between the abscissae that were asked for; all, where none were."""
+    """Return the mask of points between the abscissae ``within``; all points without this key."""
     if "within" not in spec:
         return np.ones(u.size, dtype=bool)
     low, high = spec["within"]
@@ -134,12 +136,12 @@ def _within(path, spec, u):
 
 
 def _shows_back(u, f):
-    """Whether a wheel's innermost points, in the package's directions, go up again behind the flange's tip."""
+    """Whether a wheel's innermost points, in the package's directions, rise again behind the flange's tip."""
     return bool(u.size) and bool(f[u < u.min() + _FACE].max() > f.min() + _BACK)
 
 
 def _placed(spec, kind, stated, u, f, path):
-    """Points in the package's directions, and from its origin; what was done to them, and which keys were assumed."""
+    """Return points in the package's axes, a text of the conversions, names of assumed keys, and all keys used."""
     seen = stated.mirrored is None
     mirrored, downwards = profile_meters.seen(kind, u, f) if seen else (stated.mirrored, stated.downwards)
     given = {"mirrored": mirrored, "downwards": downwards, "tape_circle": stated.tape_circle, **spec}
@@ -170,7 +172,7 @@ def _placed(spec, kind, stated, u, f, path):
 
 
 def _mends(spec, mends, given):
-    """What messages advise, beside the keys of ``mends`` that the file's form has."""
+    """Return the advice for messages: ``mends`` of the file's format, completed with keys for wrong directions."""
     if mends.u:  # a SIMPACK file states its directions
         return mends
     turned = {key: f"{key}: {str(not given[key]).lower()}" for key in ("mirrored", "downwards")}
@@ -181,12 +183,13 @@ def _mends(spec, mends, given):
 
 
 def _ranges(lines):
-    """Line numbers as text, runs of them as ranges."""
+    """Return line numbers as text, with ranges for successive numbers."""
     runs = np.split(lines, np.flatnonzero(np.diff(lines) != 1) + 1)
     return ", ".join(f"{run[0]}" if run.size == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
 def _checked(spec, kind):
+    """Return ``spec``; InputError for unknown keys, wrong values or keys that do not belong to the file's format."""
     unknown = sorted(str(k) for k in set(spec) - _KEYS)
     if unknown:
         raise InputError(kind, unknown[0], one_of(sorted(_KEYS), unknown[0]))
@@ -220,7 +223,7 @@ def _checked(spec, kind):
 
 
 def _check_origin(spec, kind):
-    """A wheel's origin is said once, a rail's not at all."""
+    """Raise an InputError if a wheel's origin is stated twice, or a rail's origin by a key for wheels."""
     given = [key for key in ("shift", "tape_circle", "flange_back") if key in spec]
     if len(given) > 1:
         raise InputError(kind, given[1], f"expected this or {given[0]}, not both")
@@ -237,8 +240,8 @@ def _is_distance(value):
 
 
 def read_columns(path, text, kind, unit=None):
-    """Points u, f (n,) in m of a file of columns, the line number of each, the unit, and whether a header
-    states it; it must agree with ``unit``."""
+    """Read points u, f (n,) in m from a file of columns, the line number of each, the unit, and whether a header
+    states the unit, which must agree with ``unit``."""
     file = read_column_file(path, text, header=False)
     columns, headed = [0, 1], False
     if file.names:
@@ -263,7 +266,7 @@ def read_columns(path, text, kind, unit=None):
 
 
 def _agreed(path, line, stated, declared):
-    """The unit that a header states of both columns, or that is declared where it states none."""
+    """Return the unit that a header states for both columns, or the declared unit if it states none."""
     known = [{"in": "inch", "µm": "um", "μm": "um", "": declared}.get(unit.lower(), unit.lower()) for unit in stated]
     if known[0] != known[1] or declared not in (None, known[0]) or known[0] not in (None, *UNITS):
         got = f"u in {stated[0] or 'no unit'}, f in {stated[1] or 'no unit'}"
@@ -273,7 +276,7 @@ def _agreed(path, line, stated, declared):
 
 
 def _header(path, text):
-    """Keys before the points, as text, and the line numbers of the key lines."""
+    """Return the keys before the points, as text, and the number of the line ``point.begin``."""
     keys = {}
     for number, line in enumerate(text.splitlines(), 1):
         line = line.partition("!")[0].strip()
@@ -306,11 +309,10 @@ def _value(path, keys, name, default):
 
 
 def read_simpack(path, text, smoothed=False):
-    """Points u (to the field side) and f (up), (n,) in m, of a SIMPACK .prw or .prr file, and the line number of each.
+    """Read points u (to the field side) and f (up), (n,) in m, of a SIMPACK .prw or .prr file, and their line numbers.
 
-    Applied, in the order of the file's own numbering: shift, bounds, mirroring, inversion, unit. Rotation, minimum
-    distance and, unless the caller smooths, SIMPACK's approximation are refused where they are not zero, as their
-    definition is not public."""
+    Shift, bounds, mirroring, inversion and unit are applied in the order of the file's numbering. Rotation, minimum
+    distance and (without ``smoothed``) SIMPACK's approximation must be zero, as their definition is not public."""
     keys, begin = _header(path, text)
     for name in _UNSUPPORTED[: 2 if smoothed else 3]:
         if _value(path, keys, name, 0.0):
@@ -344,7 +346,7 @@ def _simpack_points(path, text, begin):
 
 
 def _inside(path, keys, axis, values):
-    """SIMPACK's bounds; a minimum above the maximum switches them off."""
+    """Return the mask of values inside SIMPACK's bounds; a minimum above the maximum disables the bounds."""
     low = _value(path, keys, f"bound.{axis}.min", 1.0)
     high = _value(path, keys, f"bound.{axis}.max", 0.0)
     return np.ones(values.size, dtype=bool) if low > high else (values >= low) & (values <= high)

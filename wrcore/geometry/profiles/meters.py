@@ -1,11 +1,11 @@
-"""Files of profile meters (MiniProf) and of Vampire: points as they stand there, with the directions and origin that
-the file states or its kind implies.
+"""Readers of profile meter files (MiniProf) and Vampire files: unchanged points, with their directions and origin.
 
-MiniProf, ``.whl`` (wheels), ``.ban`` (rails), ``.mpt`` (parts): mm; a header of lines ``Key=value``, or one that says
-MINIPROF and ends at a blank line; ``"``, ``%``, ``!`` and ``#`` begin comments. Wheels count from the flange back, up
-is where the flange points; the tape circle is at ``WheelDiameterTaperline``, else at `TAPE_CIRCLE`. Rails have the
-gauge side at positive abscissae. Up or down is seen from the points. Parts are sections ``[Profile1Info]``,
-``[Profile1Points]``. Source: files in CONTACT's test bank, its user guide (mirroring) and ``read_miniprof.m``.
+MiniProf, ``.whl`` (wheels), ``.ban`` (rails), ``.mpt`` (parts): mm; a header of lines ``Key=value``, or a header that
+begins with MINIPROF and ends at a blank line; ``"``, ``%``, ``!`` and ``#`` begin comments. Abscissae of wheels are
+measured from the flange back, the flange points upwards; the tape circle is at ``WheelDiameterTaperline``, else at
+`TAPE_CIRCLE`. Rails have the gauge side at positive abscissae. The vertical direction is detected from the points.
+Parts are sections ``[Profile1Info]``, ``[Profile1Points]``. Source: files in CONTACT's test bank, its user guide
+(mirroring) and ``read_miniprof.m``.
 
 Vampire, ``.whe`` (wheels), ``.rai`` (rails): four lines of header, then y and z of the left and of the right side in
 mm, z up for rails, flange up for wheels. Source: ``read_vampire.m`` of CONTACT.
@@ -24,45 +24,45 @@ METER_FILES = (".whl", ".ban", ".mpt")
 VAMPIRE_FILES = (".whe", ".rai")
 
 TAPE_CIRCLE = 0.070
-"""Distance of the tape circle from the flange back where nobody states one, m (EN 15302)."""
+"""Default distance of the tape circle from the flange back, m (EN 15302)."""
 
 _INCH = 0.0254
 _DATUMS = {"EUROPEAN": 0.070, "US1": (2 + 27 / 32) * _INCH, "US2": (3 + 1 / 16) * _INCH}
 _GAUGE_POINTS = {"EUROPEAN": 0.014, "US": 5 / 8 * _INCH}
 _FOUR = "y and z of the left and of the right side, four numbers"
-_END = 0.05  # of the points: extremes that close to an end are side faces
+_END = 0.05  # fraction of the points at either end in which an extremum belongs to a side face
 
 
 class Stated(NamedTuple):
-    """What a file says of its points, or its kind implies."""
+    """Directions and origin of a file's points, as the file states or its type implies."""
 
     about: str
     mirrored: bool | None = False
     downwards: bool | None = False
-    """None of both: as `seen` from the points."""
+    """If both directions are None, they are detected from the points by `seen`."""
     tape_circle: float = 0.0
     """Abscissa (m, to the field side) of a wheel's tape circle from the file's origin."""
     assumed: tuple[str, ...] = ()
-    """Which of these nobody has stated."""
+    """Names of the fields that are assumed, not stated."""
     offset: tuple[float, float] = (0.0, 0.0)
-    """Added to the file's two coordinates, m."""
+    """Offset to be added to the file's two coordinates, m."""
     odd: str = ""
-    """What a reader should look at."""
+    """Irregularity of the file, for a warning."""
     trimmed: bool = True
-    """Whether side faces are left out instead of refused."""
+    """Whether side faces are left out; else they are an error."""
     mends: Mends = Mends()
-    """What messages advise."""
+    """Advice for messages."""
 
 
 def is_meter_file(path, text):
-    """Whether a file is read with a profile meter's conventions."""
+    """Whether a file has a profile meter's format, by its ending or its first line."""
     return path.suffix.lower() in METER_FILES or bool(re.match(r"\ufeff?\s*(#\s*MINI|MINIPROF\b|\[FileInfo\])", text))
 
 
 def read_meter(path, text, kind, unit, part=None):
-    """Points x, y (n,) in m as a MiniProf file has them, the line number of each, and `Stated`.
+    """Read points x, y (n,) in m from a MiniProf file, the line number of each, and `Stated`.
 
-    ``unit``: m per unit of the file; ``part``: number of a section, for files with several."""
+    ``unit`` is the length of the file's unit, m; ``part`` is the number of a section, for files with several."""
     rows = _rows(text)
     rows, about = _part(path, rows, part)
     keys, rows = _meter_header(path, rows)
@@ -80,13 +80,13 @@ def read_meter(path, text, kind, unit, part=None):
 
 
 def _rows(text):
-    """Lines without comments, with their numbers."""
+    """Return the lines without comments, with their numbers; lines with only a comment are left out."""
     lines = ((number, re.split('["%!#]', line)[0].strip(), line) for number, line in enumerate(text.splitlines(), 1))
     return [(number, line) for number, line, whole in lines if line or not whole.strip()]
 
 
 def _part(path, rows, part):
-    """The rows of one part of a file that has several, header first."""
+    """Return the rows of one part of a file, header first, and a description; files without parts are one part."""
     heads = [(k, re.fullmatch(r"\[Profile(\d+)(Info|Points)\]", line)) for k, (_, line) in enumerate(rows)]
     starts = {(int(m[1]), m[2]): k for k, m in heads if m}
     parts = sorted({number for number, what in starts if what == "Points"})
@@ -107,7 +107,7 @@ def _part(path, rows, part):
 
 
 def _meter_header(path, rows):
-    """Keys before the points, lower case, and the rows with points."""
+    """Return the header's keys, in lower case, and the rows with points."""
     old = next((k for k, (_, line) in enumerate(rows) if line.upper().startswith("MINIPROF")), None)
     if old is not None:
         blank = next((k for k in range(old, len(rows)) if not rows[k][1]), None)
@@ -124,7 +124,7 @@ def _meter_header(path, rows):
 
 
 def _columns(path, keys):
-    """Places of X and Y among the columns."""
+    """Return the indices of the columns X and Y."""
     names = [name.strip().upper() for name in keys.get("columndef", "X,Y").split(",")]
     if "X" not in names or "Y" not in names:
         raise InputError(path, "ColumnDef", f"expected columns X and Y, got {keys['columndef'][:40]!r}")
@@ -132,7 +132,7 @@ def _columns(path, keys):
 
 
 def _key(path, keys, name):
-    """The number under a key; 0 where there is none."""
+    """Return the number under a key, or 0 without the key."""
     text = keys.get(name) or "0"
     try:
         value = float(text)
@@ -144,9 +144,11 @@ def _key(path, keys, name):
 
 
 def seen(kind, x, y):
-    """Whether the abscissa counts to the track's centre, and the ordinate down, as the points show: side faces of
-    wheels and rails point away from where they touch. A wheel's flange is beside its flange back; a rail's gauge side
-    cannot be seen and is taken to be at positive abscissae, as meters have it."""
+    """Detect from points whether the abscissa is positive towards the track's centre and the ordinate downwards.
+
+    The side faces of wheels and rails point away from the contact, and a wheel's flange is near its flange back. A
+    rail's gauge side cannot be detected; it is taken to be at positive abscissae, as in files of profile meters.
+    """
     if y.size < 2:
         return False, False
     lowest, highest = (np.argmin(y) / (y.size - 1), np.argmax(y) / (y.size - 1))
@@ -159,7 +161,7 @@ def seen(kind, x, y):
 
 
 def read_vampire(path, text, kind, side="right"):
-    """Points y, z (n,) in m of one ``side`` of a Vampire file, the line number of each, and `Stated`."""
+    """Read points y, z (n,) in m of one ``side`` of a Vampire file, the line number of each, and `Stated`."""
     rows = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
     first = rows[0][1].upper() if rows else ""
     found = {"WHEELPROFILE": "wheel", "RAILPROFILE": "rail"}.get(first)
@@ -183,7 +185,7 @@ def read_vampire(path, text, kind, side="right"):
 
 
 def _vampire_key(path, rows, number, key, named):
-    """Value in m of a header line ``key value`` or ``key NAME``, and its name."""
+    """Return the value (m) of a header line ``key value`` or ``key NAME``, and its name."""
     line = rows[number - 1][1] if len(rows) >= number else ""
     words = line.upper().split()
     if words[:1] == [key] and len(words) > 1:

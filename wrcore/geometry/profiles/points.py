@@ -1,4 +1,4 @@
-"""Measured points to a smooth outline: checks, parametric spline, origin."""
+"""Smooth outline through measured points: checks, parametric spline, origin."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -14,22 +14,22 @@ if TYPE_CHECKING:  # a third of a second that runs with standard profiles need n
     from scipy.interpolate import BSpline
 
 FEWEST = 8
-"""Fewest points that make a profile."""
+"""Smallest number of points of a profile."""
 
-_CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
-_DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
-_LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
-_ANY_SLOPE, _STEEP = 1e6, 10.0  # beyond the latter no curve goes on
-_NARROWEST = 0.02  # m; less of a profile is left only where its points are faulty
-_LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than this
-_WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
-_STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
-_COARSE = 3e-4  # m; a file whose points leave more open between two of them is told
-_BENDS = 2.0  # 1/m; noise that bends a profile by more is said: 1 um at points 0.5 mm apart bends by 4
-_MEDIAN = 0.6745  # of the size of Gaussian noise, over its standard deviation
+_CLOSE = 1e-7  # m; the direction between closer points is dominated by rounding errors
+_DEEPEST = 0.025  # m below a rail's top; deeper points, often around the head's underside, are never in contact
+_LEVEL = 2e-7  # m; a rail's origin this close to the height of the top is kept
+_ANY_SLOPE, _STEEP = 1e6, 10.0  # no limit of slope; largest slope of a curve
+_NARROWEST = 0.02  # m; smallest usable width of a profile, below it the points are wrong
+_LEFT_OUT = 3e-3  # m; largest width of the side faces of a single-valued profile
+_WIDEST, _USUAL = 0.010, 5.0  # largest bridged gap, m; a gap is longer than this many median distances of points
+_STRAIGHT, _BENT = 2e-5, 5e-4  # m; deviation from a line over a gap: below the first no gap, above the second an error
+_COARSE = 3e-4  # m; largest deviation from a line between two points without a warning
+_BENDS = 2.0  # 1/m; curvature from noise above which wrcore warns: 1 um at points 0.5 mm apart is 4 1/m
+_MEDIAN = 0.6745  # ratio of the median magnitude of Gaussian noise to its standard deviation
 _QUIET = 4e-7  # m; noise below it, and rounding to 1 um, changes conicity by less than 0.002
 _ADVISED = 1.1  # smoothing over noise; from 0.7 to 1.4 conicity improves (0.5 to 10 um, points 0.1 to 1 mm apart)
-_BACK = 1e-3  # m; where two passes of a meter are joined, points go back by less than this
+_BACK = 1e-3  # m; largest backward step of u where two passes of a meter are joined
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ class Outline:
     curve: "BSpline"
     name: str
     points: np.ndarray
-    """All points that were given, m, (n, 2), in its pose."""
+    """(n, 2): all given points in the axes of the outline, m."""
     s: np.ndarray
-    """Their parameters, (n,), NaN for those that it does not follow."""
+    """(n,): parameters of the points, NaN for points that were left out."""
 
     def _component(self, column):
         from scipy.interpolate import PPoly
@@ -53,16 +53,16 @@ class Outline:
         return np.unique(np.concatenate([knots[:-1] + k / 8 * np.diff(knots) for k in range(8)] + [knots[-1:]]))
 
     def span(self, steepest):
-        """Connected range of u (m) around 0 that is single-valued and no steeper than ``steepest``."""
+        """Return the connected range of u (m) around 0 that is single-valued and no steeper than ``steepest``."""
         return tuple(map(float, self.curve(np.array(self._ends(steepest)))[:, 0]))
 
     def followed(self, steepest):
-        """Which of the points lie on `span`, (n,)."""
+        """Return the mask (n,) of points on the part of the outline within `span`."""
         first, last = self._ends(steepest)
         return (self.s >= first) & (self.s <= last)
 
     def _ends(self, steepest):
-        """Parameters of the ends of `span`."""
+        """Return the parameters of the ends of `span`."""
         s = self._dense()
         u = self.curve(s)[:, 0]
         du, df = self.curve(s, nu=1).T
@@ -75,13 +75,16 @@ class Outline:
         return s[first], s[last]
 
     def working_span(self, steepest, trim):
-        """`span`, refused where it is too narrow or, unless ``trim``, ends long before the points do."""
+        """Return `span`; InputError if it is too narrow or if too many points are outside.
+
+        With ``trim`` points outside may be side faces and undersides of heads.
+        """
         low, high = self.span(steepest)
         if high - low < _NARROWEST:
             got = f"got {high - low:.3g} m of it"
             raise InputError(self.name, "points", f"expected a smooth profile around u = 0, {got}")
         u, f = self.curve(self._dense()).T
-        if trim:  # side faces and chins, but no other head and no flange
+        if trim:  # allow side faces and undersides of heads, but no second head and no flange
             u = u[f > f[(u >= low) & (u <= high)].max() - _DEEPEST]
         for end, rest in ((low, low - u.min()), (high, u.max() - high)):
             if rest > _LEFT_OUT:
@@ -93,13 +96,13 @@ class Outline:
         return low, high
 
     def evaluate(self, u):
-        """Ordinate (m) and slope at the abscissae ``u`` (m, inside `span`)."""
+        """Return ordinate (m) and slope at the abscissae ``u`` (m, inside `span`)."""
         s = self._parameter(u)
         du, df = self.curve(s, nu=1).T
         return self.curve(s)[:, 1], df / du
 
     def _parameter(self, u):
-        """Solve u(s) = u: Newton from a close start, as u(s) is monotone inside the span."""
+        """Solve u(s) = u for s by Newton's method from a close start; u(s) is monotone inside the span."""
         dense = self._dense()
         table = self.curve(dense)[:, 0]
         home = int(np.argmin(np.abs(table)))
@@ -113,19 +116,22 @@ class Outline:
         return s
 
     def highest(self):
-        """Highest point (u, f), m."""
+        """Return the highest point (u, f), m."""
         s = np.concatenate(([0.0, 1.0], self._component(1).derivative().roots(extrapolate=False)))
         points = self.curve(s[np.isfinite(s)])
         u, f = points[np.argmax(points[:, 1])]
         return float(u), float(f)
 
     def shifted(self, du, df):
-        """The outline moved by (``du``, ``df``), m."""
+        """Return the outline moved by (``du``, ``df``), m."""
         moved = type(self.curve)(self.curve.t, self.curve.c + (du, df), self.curve.k)
         return replace(self, curve=moved, points=self.points + (du, df))
 
     def innermost(self, depth):
-        """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0, NaN if not reached."""
+        """Return the abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0.
+
+        The result is NaN if the outline does not reach this depth at negative u.
+        """
         u, f = self.curve(np.unique(self.curve.t)).T
         if not np.any((u < 0.0) & (f <= -depth)):
             return float("nan")
@@ -136,9 +142,11 @@ class Outline:
 
 
 def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0, mends=None):
-    """Outline through points that have been checked, in its pose: wheel f(0) = 0, rail with its origin at the highest
-    point; arguments as for `wrcore.geometry.profiles.profile.ProfileCurve.from_points`. ``mends`` (`Mends`): what
-    messages advise, False where the shape needs no check."""
+    """Check measured points and return the outline through them: wheel f(0) = 0, rail with its origin at the top.
+
+    Arguments are those of `wrcore.geometry.profiles.profile.ProfileCurve.from_points`. ``mends`` (`Mends`) is the
+    advice in messages; with False the shape is not checked.
+    """
     mends = Mends() if mends is None else mends
     u, f = np.array(u, dtype=float), np.array(f, dtype=float)
     lines = np.arange(1, u.size + 1) if lines is None else np.asarray(lines)
@@ -147,7 +155,7 @@ def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0
     rounding = _rounding(u, f, (mends or Mends()).factor)
     if not 0.0 <= smoothing <= 1e-3:
         raise InputError(name, "smoothing", f"expected a distance in m, 0 to 0.001, got {smoothing:g}")
-    kept = np.flatnonzero(np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0)))  # a point twice says nothing more
+    kept = np.flatnonzero(np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0)))  # leave out repeated points
     if u[-1] < u[0]:
         kept = kept[::-1]
     if not trim:
@@ -182,7 +190,7 @@ def _check_numbers(u, f, name, lines):
 
 
 def _has_side_faces(u, f, name, lines):
-    """Whether points do not advance on faces at their ends, which are left out; refuse those that do not elsewhere."""
+    """Whether u does not increase on side faces at the ends; InputError if it does not increase elsewhere."""
     du, df = np.diff(u), np.diff(f)
     at_end = np.minimum(u[1:] - u.min(), u.max() - u[1:]) < _LEFT_OUT
     back = du <= 0.0
@@ -196,7 +204,7 @@ def _has_side_faces(u, f, name, lines):
 
 
 def _head(u, f, lines, name):
-    """The connected run of rail points around the highest one, down to where nothing is touched, as a slice."""
+    """Return the slice of connected rail points around the highest point, down to `_DEEPEST` below it."""
     top = int(np.argmax(f))
     low = f < f[top] - _DEEPEST
     deep = np.flatnonzero(low)
@@ -210,8 +218,10 @@ def _head(u, f, lines, name):
 
 
 def _forward(u, f):
-    """Which points remain without those that step back by less than `_BACK`, where a meter's passes are joined: not on
-    side faces, which may really go back."""
+    """Return the mask of points without backward steps of less than `_BACK`, where a meter's passes are joined.
+
+    Points of side faces are kept, as these may be undercut.
+    """
     remain, du, df = np.ones(u.size, dtype=bool), np.diff(u), np.diff(f)
     level = np.abs(df) < du
     for i in np.flatnonzero((du[1:] < 0.0) & (np.abs(df[1:]) < -_STEEP * du[1:]) & level[:-1]) + 2:
@@ -222,7 +232,7 @@ def _forward(u, f):
 
 
 def _check_gaps(u, f, name, lines):
-    """Say which gaps between points are bridged, and refuse those where nobody knows the shape."""
+    """Warn of gaps between points that are bridged; InputError for gaps over which the shape is unknown."""
     du, df = np.diff(u), np.diff(f)
     length, angle = np.hypot(du, df), np.arctan2(df, du)
     turn = np.abs(np.diff(angle, prepend=angle[:1], append=angle[-1:]))
@@ -244,8 +254,11 @@ def _check_gaps(u, f, name, lines):
 
 
 def _scatter(u, f):
-    """Standard deviation of points' noise, m, and how much it bends the curve, 1/m: each point beside the cubic through
-    its four neighbours; 0 where nothing can be said."""
+    """Return the standard deviation (m) of the points' noise and the curvature (1/m) that it adds to the curve.
+
+    The noise is estimated from the distance of each point from the cubic through its four neighbours. Both are 0 if no
+    part of the profile is suitable for the estimate.
+    """
     around = np.stack([u[i : u.size - 4 + i] for i in (0, 1, 3, 4)])
     between, own = around[:, None] - around, np.eye(4, dtype=bool)[..., None]
     with np.errstate(all="ignore"):  # on side faces points lie above each other
@@ -259,20 +272,22 @@ def _scatter(u, f):
 
 
 def _rounding(u, f, factor):
-    """Standard deviation (m) of points that are rounded to 0.1 to 0.001 units of ``factor`` m, 0 of others."""
+    """Return the rounding's standard deviation (m) of points rounded to 0.1 to 0.001 units of ``factor`` m, else 0."""
     raw = np.concatenate((u, f)) / factor
     step = next((10.0**-d for d in (1, 2, 3) if np.all(np.abs(raw - np.round(raw, d)) < 1e-3 * 10.0**-d)), 0.0)
     return step * factor / np.sqrt(12.0)
 
 
 def _smoother(size):
-    """The smoothing that evens out noise of a size (m)."""
+    """Return the text that advises a smoothing for noise of a standard deviation ``size`` (m)."""
     return f" (smoothing: {_ADVISED * size:.1e} evens them out)"
 
 
 def _check_scatter(u, f, name, rounding):
-    """Tell of points whose noise bends the curve through them, and of the smoothing that evens it out; ``rounding``
-    (m): standard deviation of rounded points, whose neighbours err alike."""
+    """Warn if the points' noise adds curvature to the curve, and advise a smoothing.
+
+    ``rounding`` (m) is the standard deviation of rounding, whose errors are correlated between neighbours.
+    """
     size, bend = _scatter(u, f)
     if bend > _BENDS and size > _QUIET and not size < 0.5 * rounding:
         advised = rounding / _ADVISED if size < 2.0 * rounding else size
@@ -280,8 +295,10 @@ def _check_scatter(u, f, name, rounding):
 
 
 def _spline(u, f, kept, name, lines, smoothing, rounding):
-    """Parametric cubic spline over chord length through the points ``kept``; those that nearly coincide with the one
-    before are left out."""
+    """Return the Outline through the points ``kept``: a parametric cubic spline over chord length.
+
+    Points that nearly coincide with the preceding point are left out.
+    """
     from scipy.interpolate import BSpline, splprep
 
     used = list(kept[:1])
@@ -308,6 +325,7 @@ def _spline(u, f, kept, name, lines, smoothing, rounding):
 
 
 def _rail_pose(outline):
+    """Return the outline of a rail moved to f = 0 at its top; an origin at the height of the top is kept."""
     top_u, top_f = outline.highest()
     low, high = outline.shifted(-top_u, 0.0).span(_ANY_SLOPE)
     if low < -top_u < high:
@@ -318,5 +336,6 @@ def _rail_pose(outline):
 
 
 def _wheel_pose(outline):
+    """Return the outline of a wheel moved vertically to f(0) = 0."""
     outline.span(_ANY_SLOPE)
     return outline.shifted(0.0, -float(outline.evaluate(np.zeros(1))[0][0]))

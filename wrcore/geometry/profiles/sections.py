@@ -1,7 +1,8 @@
 """Profile sections: arcs, straight lines and polynomials, evaluated in closed form.
 
-A profile is a tuple of sections in order of increasing u (see ``wrcore`` for the axes); `Arc` says what their methods
-give. Arcs and lines stay arcs and lines when the rail is inclined, so an inclined rail is as exact as the upright one.
+A profile is a tuple of sections in order of increasing u (see ``wrcore`` for the axes). The methods of all sections are
+described at `Arc`. Arcs and lines remain arcs and lines when the rail is inclined, so an inclined rail is as exact as
+the upright rail.
 """
 
 from dataclasses import dataclass, replace
@@ -27,12 +28,12 @@ class Arc:
 
     @classmethod
     def between(cls, start, end, uc, fc, radius, sign):
-        """Arc whose ends have the abscissae ``start`` and ``end`` (all lengths in m)."""
+        """Return the arc whose ends have the abscissae ``start`` and ``end`` (all lengths in m)."""
         first, last = (float(np.arcsin(np.clip(sign * (u - uc) / radius, -1.0, 1.0))) for u in (start, end))
         return cls(uc, fc, radius, first, last, sign)
 
     def point(self, angle):
-        """Point (u, f) at the normal angle ``angle`` (rad), m."""
+        """Return the point (u, f), m, at the normal angle ``angle`` (rad)."""
         reach = self.sign * self.radius
         return self.uc + reach * np.sin(angle), self.fc + reach * np.cos(angle)
 
@@ -42,18 +43,18 @@ class Arc:
         return self.point(self.first), self.point(self.last)
 
     def evaluate(self, u):
-        """Ordinate (m) and slope at the abscissae ``u`` (m)."""
+        """Return ordinate (m) and slope at the abscissae ``u`` (m)."""
         off = u - self.uc
         height = np.sqrt((self.radius - off) * (self.radius + off))
         return self.fc + self.sign * height, -self.sign * off / height
 
     def rotated(self, angle):
-        """The arc turned counter-clockwise about (0, 0) by ``angle`` (rad)."""
+        """Return the arc rotated counter-clockwise about (0, 0) by ``angle`` (rad)."""
         uc, fc = _rotate(self.uc, self.fc, angle)
         return replace(self, uc=uc, fc=fc, first=self.first - angle, last=self.last - angle)
 
     def shifted(self, du, df):
-        """The arc moved by (``du``, ``df``), m."""
+        """Return the arc moved by (``du``, ``df``), m."""
         return replace(self, uc=self.uc + du, fc=self.fc + df)
 
     def _holds(self, angle):
@@ -61,19 +62,19 @@ class Arc:
         return low <= angle <= high
 
     def highest(self):
-        """Highest point (u, f), m."""
+        """Return the highest point (u, f), m."""
         if self.sign > 0 and self._holds(0.0):
             return self.uc, self.fc + self.radius
         return max(self.ends, key=lambda p: p[1])
 
     def span(self, steepest):
-        """Range of u (m) in which the slope does not exceed ``steepest``; None where there is none."""
+        """Return the range of u (m) in which the slope does not exceed ``steepest``, or None."""
         limit = np.arctan(steepest)
         first, last = np.clip((self.first, self.last), -limit, limit)
         return None if first == last else (float(self.point(first)[0]), float(self.point(last)[0]))
 
     def leftmost(self, level):
-        """Points that may be the leftmost one not below the ordinate ``level`` (m)."""
+        """Return candidates (u, f), m, for the leftmost point that is not below the ordinate ``level`` (m)."""
         cosine = np.clip(self.sign * (level - self.fc) / self.radius, -1.0, 1.0)
         angles = [self.first, self.last]
         angles += [b for b in (np.arccos(cosine), -np.arccos(cosine), -self.sign * np.pi / 2) if self._holds(b)]
@@ -119,8 +120,10 @@ class Line:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """f = scale * sum c_k (u / scale)^k from ``u0`` to ``u1`` (m), ``coefficients`` ascending, ``scale`` (m) the unit
-    in which they are published. Wheels only: a polynomial is not turned."""
+    """Polynomial f = scale * sum c_k (u / scale)^k from ``u0`` to ``u1`` (m), ``coefficients`` in ascending order.
+
+    ``scale`` (m) is the unit in which they are published. Polynomials are for wheels only: they cannot be rotated.
+    """
 
     u0: float
     u1: float
@@ -128,7 +131,7 @@ class Polynomial:
     scale: float = 1e-3
 
     def evaluate(self, u):
-        """Ordinate (m) and slope at the abscissae ``u`` (m), by Horner's rule."""
+        """Return ordinate (m) and slope at the abscissae ``u`` (m), by Horner's rule."""
         t = u / self.scale
         value, slope = np.zeros_like(t), np.zeros_like(t)
         for c in reversed(self.coefficients):
@@ -143,7 +146,7 @@ class Polynomial:
         return (self.u0, float(f[0])), (self.u1, float(f[1]))
 
     def span(self, steepest):
-        """Range of u (m); published polynomial sections are never steep, so ``steepest`` is not needed."""
+        """Return the range of u (m); ``steepest`` has no effect, as published polynomial sections are not steep."""
         return self.u0, self.u1
 
 
@@ -153,16 +156,17 @@ def _rotate(u, f, angle):
 
 
 def incline(sections, inclination):
-    """Upright rail turned by atan(inclination) into its track pose, top towards the gauge side (-u), with the origin at
-    its highest point."""
+    """Return the sections of an upright rail rotated by atan(inclination), top towards the gauge side (-u).
+
+    The origin is moved to the highest point of the inclined rail.
+    """
     turned = [s.rotated(np.arctan(inclination)) for s in sections]
     u, f = max((s.highest() for s in turned), key=lambda p: p[1])
     return tuple(s.shifted(-u, -f) for s in turned)
 
 
 def usable_span(sections, steepest):
-    """Connected range of u around 0 (low, high, m) in which no section is steeper than ``steepest``, and the sections
-    that it touches."""
+    """Return the connected range of u around 0 (low, high, m) without slopes above ``steepest``, and its sections."""
     spans = [s.span(steepest) for s in sections]
     home = next(i for i, s in enumerate(spans) if s is not None and s[0] <= 0.0 <= s[1])
     first = last = home
@@ -174,14 +178,14 @@ def usable_span(sections, steepest):
 
 
 def _joined(left, right, border):
-    """True if both spans (None: no span) reach the border between their sections."""
+    """Whether both spans (None: no span) reach the border between their sections."""
     if left is None or right is None:
         return False
     return abs(left[1] - border) < 1e-9 and abs(right[0] - border) < 1e-9
 
 
 def evaluate(sections, u):
-    """Ordinate (m) and slope of a profile at the abscissae ``u`` (m, array inside the sections' range)."""
+    """Return ordinate (m) and slope of a profile at the abscissae ``u`` (m, array inside the sections' range)."""
     f, df = np.empty_like(u), np.empty_like(u)
     index = np.searchsorted([s.ends[0][0] for s in sections[1:]], u, side="right")
     for i, section in enumerate(sections):
@@ -191,8 +195,10 @@ def evaluate(sections, u):
 
 
 def innermost(sections, depth):
-    """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0; NaN where the sections end above
-    that on the gauge side."""
+    """Return the abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0.
+
+    The result is NaN if the sections end above that depth on the gauge side.
+    """
     level = -depth
     if min(s.ends[0][1] for s in sections if s.ends[0][0] < 0.0) > level:
         return float("nan")

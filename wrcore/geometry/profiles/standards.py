@@ -1,4 +1,4 @@
-"""Named profiles from their published sections, and one entrance for every way to name a profile."""
+"""Named profiles from their published sections, and `named_profile`, which accepts names, formulas and files."""
 
 import os
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class RailHead:
     """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face."""
 
     radii: tuple
-    """mm, from the crown to the gauge corner."""
+    """Radii of the arcs from the crown to the gauge corner, mm."""
     half_widths: tuple
-    """mm, half the width of the head where one radius meets the next; one fewer than ``radii``."""
+    """Half widths of the head at the joints between the arcs, mm; one fewer than ``radii``."""
     side: float
     """Inclination of the side face against the vertical, such as 1/20."""
     source: str
@@ -69,11 +69,11 @@ _S1002_SOURCE = "S1002 (EN 13715), sections with coefficients by H. Netter, DLR"
 
 
 def s1002_sections():
-    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm), f(0) = 0 at the tape circle,
-    in m.
+    """Return the sections of the S1002 wheel, in m, from the flange back (-70 mm) to the field side (60 mm).
 
-    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would turn
-    them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5)."""
+    At the tape circle f(0) = 0. With the published coefficients the height jumps by 0.118 um at -35 mm and 0.037 um at
+    -26 mm. In a Hermite cell a jump would be a wrong slope, so a linear function of u is added to section C that closes
+    both (slope change below 2e-5)."""
     h, g, f, d = (
         Arc.between(a * _MM, b * _MM, yc * _MM, -zc * _MM, r * _MM, -side) for a, b, yc, zc, r, side in _S1002_ARCS
     )
@@ -87,7 +87,7 @@ def s1002_sections():
 
 
 def _closed(polynomial, f0, f1):
-    """Add the linear function that makes the polynomial start at ``f0`` and end at ``f1`` (m)."""
+    """Return the polynomial plus the linear function with which it begins at ``f0`` and ends at ``f1`` (m)."""
     (u0, own0), (u1, own1) = polynomial.ends
     slope = ((f1 - own1) - (f0 - own0)) / (u1 - u0)
     offset = (f0 - own0) - slope * u0
@@ -96,7 +96,7 @@ def _closed(polynomial, f0, f1):
 
 
 def rail_sections(head):
-    """Sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
+    """Return the sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
     right: list = []
     start = uc = fc = before = 0.0
     ends = [w * _MM for w in head.half_widths] + [None]
@@ -119,13 +119,13 @@ def _mirrored(section):
 
 
 def circle_sections(radius):
-    """Upper part of a circle (radius in m) with its top at (0, 0): a circular rail head."""
+    """Return the section of a circular rail head (radius in m) with its top at (0, 0)."""
     end = np.arccos(max(1.0 - _CIRCLE_DEPTH / radius, 0.0))
     return (Arc(0.0, -radius, radius, -end, end),)
 
 
 def cone_sections(slope):
-    """Conical wheel: f = slope * u, the larger radius on the flange side (-u)."""
+    """Return the section of a conical wheel, f = slope * u, with the larger radius on the flange side (-u)."""
     low, high = _CONE_RANGE
     return (Line(low, slope * low, high, slope * high),)
 
@@ -138,7 +138,7 @@ def named_profile(
     window: Annotated[float, Within(1e-6, 0.1, "m")] = WINDOW,
     spacing: Annotated[float, Within(1e-6, 1e-3, "m")] = SPACING,
 ) -> ProfileCurve:
-    """Profile by name, analytic form or file.
+    """Return a profile by its name, an analytic form or a file.
 
     Parameters
     ----------
@@ -147,10 +147,11 @@ def named_profile(
         radius in m); the path of a point file (CSV, SIMPACK, MiniProf, Vampire); or ``{"points": path, "unit": "mm",
         "tape_circle": 0.07, ...}`` of which only ``points`` is required: `wrcore.geometry.profiles.files.read_profile`.
     kind : {"wheel", "rail"}
-        What the profile is used for.
+        Use of the profile.
     inclination : float, optional
-        Of the rail, for instance 1/40; 0 stands upright. Named rails and point files with ``inclined: False`` need one.
-        Other point files lie in the track pose already: beside them it must be 0 or absent, as beside wheels.
+        Inclination of the rail, for instance 1/40; 0 is upright. It is required for named rails and for point files
+        with ``inclined: False``. Points of other files have their inclination in the track: then it must be 0 or
+        absent, as for wheels.
     window : float
         Averaging length of the curvature, m.
     spacing : float
@@ -159,12 +160,12 @@ def named_profile(
     Returns
     -------
     ProfileCurve
-        Its ``source`` says where it is from and, of a file, what was read, turned and left out.
+        Its ``source`` names its origin and, for a file, the points that were read, rotated and left out.
 
     Raises
     ------
     InputError
-        Unknown name, a wheel used as a rail (or the reverse), a rail without an inclination, or a faulty file.
+        For an unknown name, a wheel used as a rail (or the reverse), a rail without an inclination, or a wrong file.
 
     Examples
     --------
@@ -192,7 +193,7 @@ def named_profile(
 
 
 def _without_effect(spec, kind):
-    """Why an inclination is refused beside a profile that it would not turn, and what to write instead."""
+    """Return the error text for an inclination without effect on the profile, with the correction."""
     name = spec.get("points") if isinstance(spec, dict) else spec
     if kind == "wheel":
         return f"expected none for the wheel {name}: only rails have one"
@@ -204,14 +205,14 @@ def _without_effect(spec, kind):
 
 
 def _is_file(spec):
-    """True for text that is meant as a path: it has a suffix or a folder, or such a file exists."""
+    """Whether a text is a path: it has a suffix or a folder, or such a file exists."""
     if not isinstance(spec, str) or spec.startswith(("cone:", "circle:")):
         return False
     return bool(Path(spec).suffix) or "/" in spec or "\\" in spec or os.path.isfile(spec)
 
 
 def _sections(spec, kind):
-    """Sections and source of a named or analytic profile that suits ``kind``."""
+    """Return the sections and the source of a named or analytic profile of a ``kind``."""
     name = str(spec)
     form, _, value = name.partition(":")
     if name == "S1002":
@@ -240,7 +241,7 @@ def _number(spec, value, low, high):
 
 
 def list_profiles() -> list[dict[str, str]]:
-    """Table of the named profiles.
+    """Return the table of the named profiles.
 
     Returns
     -------
