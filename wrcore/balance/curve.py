@@ -202,9 +202,10 @@ class Turning:
         return np.hstack([left.reshape(len(states), -1), inner])
 
     def _begin(self, known, curve, straight_on):
-        """Return the starting point for the next balance: way, moves, state (size,) and acceleration (m/s^2).
+        """Return the starting point for the next balance: way (4,), moves, state (size,) and acceleration (m/s^2).
 
-        Way and moves are the differences from the ``known`` balance; with ``straight_on`` its moves are extrapolated.
+        Way and moves (see `CurveBalance`) are differences from the ``known`` balance; with ``straight_on`` the known
+        moves are extrapolated.
         """
         way, moves = np.subtract(curve, known.curve) / FAR, np.zeros(len(self.steps))
         ratio = (way @ known.way) / (known.way @ known.way)

@@ -48,7 +48,7 @@ wheelsets from static equilibrium, m."""
 
 START_OFFSETS = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
 """Further lateral starting positions of the search for equilibrium, m, if wheels or rails differ: then the equilibrium
-may be off the centre, and worn profiles give little indication where."""
+may be off the centre, and worn profiles do not show its position."""
 
 ROUNDING = 1e-9
 """Accelerations of wheelsets below this may be rounding, m/s^2 or rad/s^2."""
@@ -249,7 +249,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
     if not model.track.tangent:
         parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
         moves = {name: (part[0], part[VELOCITY]) for name, part in parts.items()}
-        for name, part in parts.items():  # an axle box is where its wheelset is
+        for name, part in parts.items():  # an axle box is transformed with the arc length of its wheelset
             part[:] = _on_path(model.track.path, *moves[vehicle.data["bodies"][name].get("wheelset", name)], part)
     rest_of_states = np.zeros(internal_states(driven) - internal_states(model))
     rest_of_states[len(rest_of_states) - len(driven.controls.start) :] = driven.controls.start

@@ -12,7 +12,7 @@ Conventions
 * heading is the angle of t's projection onto the ground from the x axis, to the left positive; d heading/ds is the
   curvature.
 * cant h is the height of the right rail above the left one over `CANT_BASE`: positive in a canted left curve. The
-  frame's roll about t is -asin(h / CANT_BASE). The line of constant height is selectable: if it is the lower rail, the
+  frame's roll about t is -asin(h / CANT_BASE). The line of constant height is selectable. If it is the lower rail, the
   centre line is raised by |h|/2, so that t and both rails climb in a ramp.
 * The corners of linear ramps of cant, height and widening are rounded: each corner is replaced over the path's rounding
   length by a cubic spline. They are C2, t is C1, curvature is continuous. Bloss and cosine ramps have no corners; at

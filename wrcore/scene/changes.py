@@ -68,7 +68,8 @@ def _with(inner, path, value):
 def of_a_change(error, source, asked):
     """Return an error that names the change which caused it, or the given error if no change did.
 
-    ``asked`` are the changes from `changes_of`; a change causes an error if one's key path contains the other's.
+    ``asked`` are the changes from `changes_of`. A change causes an error if its key path contains the error's key path,
+    or the reverse.
     """
     for option, key, _ in reversed(asked):
         near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")

@@ -50,7 +50,7 @@ class Part(NamedTuple):
 
 
 def parts_of(item, layout, load=None):
-    """Return the parts of a checked element; a wheelset is the first of a part's two bodies where forces require it.
+    """Return the parts of a checked element; a wheelset is a part's first body if the force must act on its axle.
 
     ``load`` (N) is the load on the element, for kinds whose parts depend on it.
     """

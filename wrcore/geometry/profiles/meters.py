@@ -39,7 +39,8 @@ class Stated(NamedTuple):
     about: str
     mirrored: bool | None = False
     downwards: bool | None = False
-    """If both directions are None, they are detected from the points by `seen`."""
+    """Whether u is positive towards the track's centre, and f downwards; if None, `seen` detects both from the points.
+    """
     tape_circle: float = 0.0
     """Abscissa (m, to the field side) of a wheel's tape circle from the file's origin."""
     assumed: tuple[str, ...] = ()

@@ -43,7 +43,7 @@ class ProfileCurve:
     d2f: np.ndarray
     """(n,): second derivative from the averaged curvature, 1/m (see `averaged_second_derivative`)."""
     source: str = ""
-    """Origin of the profile."""
+    """Standard, file or form from which the profile comes."""
     outline: object = field(default=None, repr=False)
     """Exact sections (tuple) or `profile_points.Outline`; used for the gauge only."""
 
@@ -128,8 +128,7 @@ class ProfileCurve:
 
 
 def _nodes(low, high, spacing):
-    """Return the multiples of ``spacing`` from ``low`` to ``high`` (m), including ends that are multiples but for
-    rounding."""
+    """Return the multiples of ``spacing`` from ``low`` to ``high`` (m), both included within rounding."""
     return spacing * np.arange(np.ceil(low / spacing - 1e-9), np.floor(high / spacing + 1e-9) + 1)
 
 
