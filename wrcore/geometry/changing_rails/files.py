@@ -4,9 +4,10 @@
 section's first point, mm; -1: the slice has no such line); ``%`` begins a comment. Profiles in columns have the unit of
 s and heights positive downwards, unless stated otherwise. ``.slcw`` has the wheel's angle in radians in place of s.
 
-CSV: a table with the columns s_m, profile (a point file, see `profile_files`) and, if a rail has several heads, head: a
-name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ... may
-state feature lines of a head: chord lengths from its inner end. A table of a wheel has angle_rad in place of s_m.
+CSV: a table with the columns s_m, profile (a point file, see `wrcore.geometry.profiles.files`) and, if a rail has
+several heads, head: a name. A head exists from the first to the last of successive slices that have it. Columns
+cut_1_m, cut_2_m, ... may state feature lines of a head: chord lengths from its inner end. A table of a wheel has
+angle_rad in place of s_m.
 
 Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 """
