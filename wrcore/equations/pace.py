@@ -7,7 +7,7 @@ from wrcore.bodies.vector import load
 from wrcore.kernels.jit import jit
 
 HALF_GAUGE = 0.75
-"""Half of the track gauge, approximately, m."""
+"""Half of the distance between the tape circles in standard gauge, m."""
 
 RATE = 30.0
 """Maximum ratio of the velocities' tolerance to that of positions, 1/s. Above 100, forces oscillate by several per cent
