@@ -14,7 +14,7 @@ from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
 from wrcore.wheels.force import press_wheels
 from wrcore.wheels.motion import MOTION
-from wrcore.wheels.surrogate_force import bounded, without_power
+from wrcore.wheels.surrogate_patch import bounded, without_power
 
 MU, SPEED = 0.3, 40.0
 POSES = [(-5e-3, 1e-3, 9e4), (-2e-3, 0.0, 5e4), (0.0, 3e-3, 6e4), (2e-3, -2e-3, 8e4), (3.5e-3, 1e-3, 4e4),

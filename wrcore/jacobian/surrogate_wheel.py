@@ -21,18 +21,8 @@ from wrcore.wheels.contact_model import contact_of
 from wrcore.wheels.force import detect_patches, leaning_motion
 from wrcore.wheels.motion import motion_of
 from wrcore.wheels.normal_damping import Lift, lift_of
-from wrcore.wheels.surrogate_force import (
-    NOTHING_PRESSED,
-    Pressed,
-    add_patch,
-    describe_patch,
-    find_patches,
-    lean_of_group,
-    left_ahead,
-    press_group,
-    pressed_of,
-    roll_patch,
-)
+from wrcore.wheels.surrogate_force import add_patch, find_patches, lean_of_group, left_ahead
+from wrcore.wheels.surrogate_patch import NOTHING_PRESSED, Pressed, describe_patch, press_group, pressed_of, roll_patch
 
 DIFFERENCE, RATE_DIFFERENCE = 1e-9, 1e-8
 """Difference of moves (m, rad) and of the lift (m); difference of velocities (m/s, rad/s) relative to the rolling speed

@@ -18,7 +18,8 @@ from wrcore.errors import InputError
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.wheels.motion import WheelMotion
-from wrcore.wheels.surrogate_force import bounded, surrogate_wrenches
+from wrcore.wheels.surrogate_force import surrogate_wrenches
+from wrcore.wheels.surrogate_patch import bounded
 
 SMALL = Sampling(seed=3, shard_patches=5)
 

@@ -13,7 +13,7 @@ from wrcore.contact.surrogate.strips import close_strips, fill_strips
 from wrcore.creep.kalker import coefficients_at
 from wrcore.kernels.jit import jit
 from wrcore.wheels.exact_force import copy_deepest
-from wrcore.wheels.surrogate_force import _pressed
+from wrcore.wheels.surrogate_patch import _pressed
 from wrcore.wheels.table.lookup import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
 
 LIMITS = APART, FAR, SADDLE
@@ -72,7 +72,7 @@ def find_described(model, position, rows, row, sums, strips, corrections, zeros,
 @jit(allocates=False)
 def fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
     """Fill creep forces of the creep table ``base`` (n, 3) and places in the disk (n, 2), as
-    :func:`wrcore.wheels.surrogate_force.roll_patch` has them, for ``velocities`` (n, 6)."""
+    :func:`wrcore.wheels.surrogate_patch.roll_patch` has them, for ``velocities`` (n, 6)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
     unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)

@@ -30,14 +30,7 @@ from wrcore.creep.laws import LAWS
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.wheels.contact_model import without_wheels
-from wrcore.wheels.surrogate_force import (
-    _MOST_ANGLE,
-    _MOST_LOG_AXIS,
-    _MOST_LOG_LOAD,
-    _MOST_SHIFT,
-    _MOST_WIDTH,
-    bounded,
-)
+from wrcore.wheels.surrogate_patch import _MOST_ANGLE, _MOST_LOG_AXIS, _MOST_LOG_LOAD, _MOST_SHIFT, _MOST_WIDTH, bounded
 from wrcore.wheels.table import lookup as columns
 from wrcore.wheels.table.lookup import DISK
 from wrcore.wheels.table.node import (
@@ -107,7 +100,7 @@ def random_points(random, count=N_RANDOM):
 
 
 def unbounded(x, bound):
-    """Number that `wrcore.wheels.surrogate_force.bounded` maps to x; beyond 0.95 of the bound to that."""
+    """Number that `wrcore.wheels.surrogate_patch.bounded` maps to x; beyond 0.95 of the bound to that."""
     half = 0.5 * bound
     over = min(abs(x), 0.95 * bound) - half
     if not over > 0.0:
