@@ -255,7 +255,7 @@ def test_scenes_without_one_compile_none():
 
 def test_a_kind_of_another_package_is_as_a_file_beside_the_others(tmp_path, monkeypatch):
     """A module that an entry point names, here without a package."""
-    text = (ROOT / "wrcore" / "elements" / "kinds" / "traction_rod.py").read_text("utf-8")
+    text = (ROOT / "wrcore" / "forces" / "kinds" / "traction_rod.py").read_text("utf-8")
     (tmp_path / "other_package.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     entry = EntryPoint("other_rod", "other_package", kinds.GROUP)
