@@ -1,1 +1,1 @@
-"""A scene under way and what is left of it: integration, output, files, choice of accuracy, progress."""
+"""Run a scene: integration, output channels, run files, choice of accuracy and progress bars."""

@@ -1,4 +1,4 @@
-"""What a session is asked for: times, values by their names, conditions on them."""
+"""Requests to a session: times on a grid, channel values by name and end conditions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": op
 
 
 def on_grid(t: float, dt: float) -> float:
-    """A time, or the whole multiple of ``dt`` that it is but for rounding."""
+    """Return the integer multiple of ``dt`` that equals a time up to rounding errors, else the time itself."""
     rate = 1.0 / dt
     whole = round(rate)
     rate = whole if whole and abs(rate - whole) <= 1e-9 * whole else rate
@@ -26,7 +26,7 @@ def on_grid(t: float, dt: float) -> float:
 
 
 class Named(dict[str, float]):
-    """Channels by name, for functions of a user's own; what follows from them is found when it is asked for."""
+    """Channels by name, passed to a function of the user; derived channels are computed on access."""
 
     def __init__(self, values: Mapping[str, float], find: Callable[[str], Mapping[str, float]]) -> None:
         super().__init__(values)
@@ -36,7 +36,7 @@ class Named(dict[str, float]):
         return self._find(name)[name]
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Value of a channel, one that follows from others, too; else ``default``."""
+        """Return the value of a stored or derived channel, or ``default`` if there is no such channel."""
         try:
             return self[name]
         except InputError:
@@ -51,7 +51,7 @@ def told_by(
     values: Mapping[str, float],
     find: Callable[[str], Mapping[str, float]],
 ) -> bool:
-    """Whether a function of a user's own says of channels (:class:`Named`) that its condition holds."""
+    """Whether the condition holds: call the user's function with the channels (:class:`Named`)."""
     found = function(Named(values, find))
     if not isinstance(found, bool | np.bool_):
         raise InputError(
@@ -61,7 +61,7 @@ def told_by(
 
 
 def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]], bool]]:
-    """Names of channels and the test that a text such as ``wheelset.y_m > 0.004`` stands for."""
+    """Parse a condition such as ``wheelset.y_m > 0.004``: return names of its channels and the test function."""
     parts = re.fullmatch(r"\s*(\S+)\s*([<>])\s*(\S+)\s*", text)
     try:
         name, sign, bound = parts[1], parts[2], float(parts[3])  # type: ignore[index]
@@ -74,7 +74,7 @@ def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]],
 
 
 def value_of(run: Run, name: str) -> float:
-    """One value of a run of one time by its name in a table."""
+    """Return one number from a run with a single output time, by its column name in a table of a run."""
     group, _, channel = name.partition(".")
     channel, _, patch = channel.partition(".")
     values = run[group][channel][0]

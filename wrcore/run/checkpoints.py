@@ -1,4 +1,4 @@
-"""Checkpoints in HDF5 files: nested tuples of arrays and numbers, as groups of datasets and attributes, bit by bit."""
+"""Checkpoints in HDF5 files: nested tuples of arrays and numbers, stored exactly as groups, datasets and attributes."""
 
 import hashlib
 from typing import NamedTuple, get_type_hints
@@ -13,11 +13,11 @@ from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint
 
 NOT_THERE = {"patches": np.zeros((0, 0, 0, MEMORY)), "notes": np.zeros(0)}
-"""What files of before there was such a thing are taken to hold."""
+"""Values of datasets that files of older versions do not contain."""
 
 
 class _Saved(NamedTuple):
-    """A checkpoint as it lies in a file; a method without a Jacobian has no ``linear``."""
+    """Fields of a checkpoint that are stored in a file; ``linear`` is None for a method without a Jacobian."""
 
     memory: Memory
     linear: Linear
@@ -34,9 +34,9 @@ def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(group: h5py.Group) -> Checkpoint:
-    """Read what `write_checkpoint` wrote; KeyError where something is missing."""
+    """Read a checkpoint that `write_checkpoint` wrote; KeyError if an entry is missing."""
     saved = _read(group, _Saved)
-    if saved.patches.shape[-1] != MEMORY:  # of an earlier version: patches start from nothing
+    if saved.patches.shape[-1] != MEMORY:  # file of an earlier version: start without stored patches
         saved = saved._replace(patches=np.zeros((*saved.patches.shape[:-1], MEMORY)))
     return Checkpoint(str(group.attrs["method"]), float(group.attrs["t"]), *saved, str(group.attrs.get("model", "")))
 
@@ -52,7 +52,7 @@ def _write(group, parts):
 
 
 def _read(group, kind):
-    """The tuple of a class that a group holds; arrays and numbers get the types that kernels were compiled for."""
+    """Read a tuple of the class ``kind`` from a group; arrays and numbers get the types that the kernels expect."""
     parts = {}
     for name, type_ in get_type_hints(kind).items():
         if type_ is np.ndarray:
@@ -66,13 +66,13 @@ def _read(group, kind):
 
 
 def model_fingerprint(model: Model) -> str:
-    """Digest of all that a compiled model is made of."""
-    contact = model.contact._replace(creep=model.contact.creep._replace(own=0))  # an address, of this process alone
+    """Return the SHA-256 digest (hex) of all numbers of a compiled model."""
+    contact = model.contact._replace(creep=model.contact.creep._replace(own=0))  # an address of this process only
     return digest_of(model._replace(contact=contact)).hexdigest()
 
 
 def digest_of(parts, *texts: str):
-    """SHA-256 of texts and of all arrays and numbers of nested tuples, with their types and shapes."""
+    """Return the SHA-256 hash object of texts and of all arrays of nested tuples, with their types and shapes."""
     digest = hashlib.sha256("\0".join(texts).encode())
     for array in _numbers(parts):
         digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())

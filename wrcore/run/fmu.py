@@ -1,7 +1,7 @@
 """Functional mock-up units of scenes: a session behind the interface of FMI 2 or FMI 3 for co-simulation.
 
-The file holds the scene with all files that it names, a few lines of Python and the binary of PythonFMU, which runs
-them in the Python of the machine: there, ``import wrcore`` must work. The binary, not wrcore, speaks FMI.
+The file contains the scene with all files that it names, a short Python script and the binary of PythonFMU. The binary
+implements FMI and runs the script in the Python of the machine. There, ``import wrcore`` must work.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from wrcore.scene.description import Scene
 from wrcore.scene.pairs import find_file, with_names
 
 LIBRARIES = {2: ("pythonfmu", "Fmi2Slave", "Real", "Fmi2"), 3: ("pythonfmu3", "Fmi3Slave", "Float64", "Fmi3")}
-"""By the version of FMI: the library, what it calls a slave and a number, and how its other names begin."""
+"""Library of each FMI version: its name, its class of a slave, its class of a number, and the prefix of its names."""
 
 SCENE, INTERFACE = "scene.yaml", "interface.json"
 
 JUMP = 1e-9
-"""Share of the time by which a communication point may differ from the end of the last step: rounding of the master."""
+"""Largest relative difference between a communication point and the end of the last step: the master rounds."""
 
 SCRIPT = '''"""A scene of wrcore {version} as a functional mock-up unit; it needs wrcore where it runs."""
 
@@ -56,14 +56,14 @@ class {name}({bases}):
 
 
 class SteppedScene:
-    """What a unit does, for a class that also is a slave of PythonFMU."""
+    """Behaviour of a unit: mixin for a class that also inherits from a slave class of PythonFMU."""
 
     number: Any
     causality: Any
     variability: Any
     held: list[Any]
-    """The names of the unit's script: PythonFMU's binary for FMI 2 (0.7.0) gives back a reference to them that it has
-    only borrowed, at each instance, and would free what is in use."""
+    """References to the globals of the unit's script, one per instance, so that they are not freed while in use.
+    PythonFMU's binary for FMI 2 (0.7.0) releases a borrowed reference to them at each instance."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
@@ -94,11 +94,11 @@ class SteppedScene:
         return put
 
     def setup_experiment(self, start_time: float, *_: Any) -> None:
-        """Take over the time at which the master begins, s."""
+        """Store the start time of the master, s."""
         self._begin = float(start_time)
 
     def _present(self) -> Session:
-        """The session, begun when it is first needed, at the master's start time: tables over time are read there."""
+        """Return the session; the first call starts it at the master's start time, at which tables over time begin."""
         if self._session is None:
             for name, digest in self._digests.items():
                 if digest_of_file(self._folder / name) != digest:
@@ -111,7 +111,7 @@ class SteppedScene:
         return self._session
 
     def _output(self, name):
-        """A channel; all that are outputs are found at once."""
+        """Return the value of an output channel; all outputs of one time are computed together."""
         session = self._present()
         if self._read[0] != session.time:
             self._read = session.time, session.channels(*self._outputs)
@@ -121,8 +121,11 @@ class SteppedScene:
         self._present()
 
     def do_step(self, current_time: float, step_size: float) -> Any:
-        """Step with the inputs as they are; False, which discards the step, with a line on standard error for a step
-        that is none, or that cannot go on. The unit stays alive: a master may read its outputs or restore a state."""
+        """Step with the present inputs; return False, which discards the step, if the step is invalid or fails.
+
+        Then one line on standard error says why. The unit can still be used: a master may read its outputs or restore
+        a state.
+        """
         session = self._present()
         try:
             if abs(current_time - session.time) > JUMP * max(1.0, abs(session.time), abs(step_size)):
@@ -142,7 +145,7 @@ class SteppedScene:
         root = super().to_xml(*options)  # type: ignore[misc]
         root.set("variableNamingConvention", "flat")
         structure = root.find("ModelStructure")
-        if (outputs := structure.find("Outputs")) is not None:  # of FMI 2, where PythonFMU leaves the others out
+        if (outputs := structure.find("Outputs")) is not None:  # FMI 2: PythonFMU omits InitialUnknowns
             outputs = copy.deepcopy(outputs)
             outputs.tag = "InitialUnknowns"
             structure.append(outputs)
@@ -158,7 +161,7 @@ class SteppedScene:
 
 
 def library_of(fmi: int) -> ModuleType:
-    """The library that makes units of a version; an InputError says how to install it."""
+    """Import the library that builds units of an FMI version; an InputError says how to install it."""
     try:
         return import_module(LIBRARIES[fmi][0])
     except ImportError:
@@ -167,8 +170,10 @@ def library_of(fmi: int) -> ModuleType:
 
 
 def write_fmu(scene: Scene, path: Path, fmi: int = 2, outputs: Iterable[str] = ()) -> tuple[list[str], list[str]]:
-    """Write a scene as a unit for co-simulation: names of its inputs and outputs. ``outputs`` are names of
-    :meth:`Session.channels`, by default all of bodies and the drive; InputError for one that there is not.
+    """Write a scene as a unit for co-simulation and return the names of its inputs and of its outputs.
+
+    ``outputs`` are names of :meth:`Session.channels`, by default all channels of bodies and of the drive. InputError if
+    a name does not exist.
     """
     library, session = library_of(fmi), start(scene)
     numbers = [name for name in session.channels() if "/" not in name or name.startswith("drive/")]
@@ -196,7 +201,7 @@ def write_fmu(scene: Scene, path: Path, fmi: int = 2, outputs: Iterable[str] = (
 
 
 def _start_of(value, text):
-    """Start value and description of an input."""
+    """Return start value (None if it is NaN: the scene's table applies) and description of an input."""
     return (value, text) if value == value else (None, f"{text}; until it is set the scene's table rules")
 
 
@@ -206,7 +211,7 @@ def _options(fmi):
 
 @contextmanager
 def _import_state():
-    """Undo what an import of a script leaves behind."""
+    """Restore `sys.path` and remove imported modules of units after the import of a script."""
     path, modules = list(sys.path), set(sys.modules)
     try:
         yield
@@ -225,7 +230,7 @@ def _pack_scene(scene, folder):
     laws = _pack_laws(scene, folder, names)
     for path in scene.files.keys() - scene.laws.files.keys():
         shutil.copy(path, folder / names[path])
-        if any(str(listed) in names for listed in profiles_in(path)):  # slices, whose profiles have other names now
+        if any(str(listed) in names for listed in profiles_in(path)):  # slices, whose profiles were renamed
             text = with_profiles(path, lambda name, at=Path(path).parent: names.get(str(at / name), name))
             (folder / names[path]).write_text(text)
     content = _with_laws(with_names(scene.data, Path(scene.source).parent, names), laws)
@@ -238,19 +243,19 @@ def _pack_scene(scene, folder):
 
 
 def _pack_laws(scene, folder, names):
-    """Write the files of a scene's laws, as they were read with it, and return the texts that name them there."""
+    """Write the files of a scene's laws as they were when the scene was read; return the new text of each law."""
     laws = {}
     for text, source in scene.laws.known.items():
         if isinstance(source, LawFile):
             (folder / names[source.path]).write_bytes(source.content)
             laws[text] = f"{names[source.path]}:{source.name}"
-        elif ":" in text:  # an entry point has none: its package is installed where the unit runs
+        elif ":" in text:  # an entry point has no colon: its package must be installed where the unit runs
             raise InputError("wrcore fmu", "law", f"expected file.py:function for a unit to take along, got {text!r}")
     return laws
 
 
 def _with_laws(value, laws, key=""):
-    """A scene's content, or a part of it, with other texts for its laws."""
+    """Return a scene's content, or a part of it, with the texts of its laws replaced."""
     if isinstance(value, dict):
         return {name: _with_laws(item, laws, name) for name, item in value.items()}
     if isinstance(value, list):
@@ -259,7 +264,7 @@ def _with_laws(value, laws, key=""):
 
 
 def _vehicle_of(path, scene, laws):
-    """The content of a vehicle file with other texts for the laws of its elements."""
+    """Return the content of a vehicle file with the texts of its elements' laws replaced."""
     data, folder = read_yaml(path), Path(path).parent
     for item in data["elements"]:
         if "law" in item:

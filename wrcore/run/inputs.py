@@ -1,6 +1,6 @@
-"""What a session may set while it runs: numbers in the arrays of a compiled model, by name.
+"""Inputs that a session may set while it runs: numbers in the arrays of a compiled model, by name.
 
-Kernels read these arrays at every evaluation, so that nothing is compiled or built anew for a new value.
+Kernels read these arrays at every evaluation, so a new value needs no compilation and no new model.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from wrcore.track.schedule import Schedules
 
 @dataclass(frozen=True)
 class Input:
-    """A number that a session may set."""
+    """A named input of a session: its meaning, unit, bounds and the numbers of the model that it sets."""
 
     meaning: str
     unit: str
     places: np.ndarray
-    """View of the model's numbers (n,), all of which become the value times the factor."""
+    """View of the model's numbers, shape (n,); setting a value makes all of them the value times the factor."""
     factor: float = 1.0
     low: float = -1e15
     high: float = 1e15
 
     @property
     def value(self) -> float:
-        """What it is now; NaN while the scene's own table holds several values."""
+        """Present value in the input's unit; NaN while the scene's table holds several values."""
         return float(self.places[0]) / self.factor if np.all(self.places == self.places[0]) else float("nan")
 
 
 def with_copied_arrays(model: Model) -> Model:
-    """A model that shares no array of inputs with its scene's vehicle."""
+    """Return the model with a copy of its input array, which it otherwise shares with the scene's vehicle."""
     return model._replace(elements=model.elements._replace(directed=model.elements.directed.copy()))
 
 
 def inputs_of(scene: Scene, model: Model) -> dict[str, Input]:
-    """Inputs of a compiled scene by name."""
+    """Return the inputs of a compiled scene by name: actuators, motors and brakes, controller and friction."""
     return {**dict(_of_actuators(scene, model)), **dict(_of_drive(scene, model)), **dict(_of_friction(model))}
 
 
@@ -56,11 +56,11 @@ def _of_actuators(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
 
 
 def _of_drive(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
-    """Torque or force of each motor and brake, or its share of the controller's force; what the controller is told."""
+    """Yield torque or force of each motor and brake, or its share of the controller's force, and controller inputs."""
     spec, drive = scene.data.get("drive") or {"motors": [], "brakes": []}, model.drive
     for k, item in enumerate([*spec["motors"], *spec["brakes"]]):
         name, brake = item["name"], k >= len(spec["motors"])
-        if drive.rows[k, KIND] == COMMANDED:  # by a control law
+        if drive.rows[k, KIND] == COMMANDED:  # a control law sets the torque
             continue
         if drive.rows[k, KIND] == CONTROLLED:
             radius = scene.vehicle.rolling_radius
@@ -77,7 +77,10 @@ def _of_drive(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
 
 
 def _of_friction(model: Model) -> Iterator[tuple[str, Input]]:
-    """Coefficient of each rail, where the scene tells the rails apart; tables of contact reach to its largest value."""
+    """Yield the coefficient of friction of each rail, if the scene has one per rail.
+
+    With tables of contact, the largest value of the scene is the upper bound, because the tables end there.
+    """
     for rail, side in enumerate(SIDES if len(model.friction.points) else ()):
         values = _values(model.friction, rail)
         most = float(values.max()) if model.contact.strips.looked_up else 1.0
@@ -85,5 +88,5 @@ def _of_friction(model: Model) -> Iterator[tuple[str, Input]]:
 
 
 def _values(tables: Schedules, k: int) -> np.ndarray:
-    """Values of a table."""
+    """Return a view of the values of the k-th table."""
     return tables.points[tables.starts[k] : tables.starts[k + 1], 1]

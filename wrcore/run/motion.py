@@ -1,4 +1,4 @@
-"""What a sampled motion shows by itself: zero crossings, frequency, amplitude, growth."""
+"""Properties of a sampled motion: zero crossings, frequency, amplitude and growth rate."""
 
 from typing import Annotated
 
@@ -14,39 +14,40 @@ Samples = Annotated[ArrayLike, Within(dimensions=1, size=0)]
 
 
 def zero_crossings(t, y):
-    """Times (s) in order at which a sampled motion y passes through zero, by linear interpolation."""
+    """Return the times (s), in order, at which a sampled motion y crosses zero, by linear interpolation."""
     t, y = np.asarray(t), np.asarray(y)
     before = _sign_changes(y)
     return t[before] - y[before] * (t[before + 1] - t[before]) / (y[before + 1] - y[before])
 
 
 def _sign_changes(y):
-    """Indices of the samples just before a change of sign."""
+    """Return the indices of the samples just before a change of sign."""
     return np.flatnonzero((y[:-1] < 0) != (y[1:] < 0))
 
 
 RIPPLE = 1.0 / 3.0
-"""A swing that is smaller than this share of a neighbouring one is a ripple on it: noise, or a second, smaller motion.
-Swings of a motion with a damping ratio of 0.33 fall to this share at each turn."""
+"""A swing smaller than this fraction of a neighbouring swing is a ripple: noise, or a second, smaller motion.
+Successive swings of a motion with a damping ratio of 0.33 have this ratio."""
 
 FADED = 0.05
-"""Share of the largest swing below which a motion counts as dead: noise of 1 % of its amplitude stays below."""
+"""Fraction of the largest swing below which a motion has died out: noise of 1 % of its amplitude is smaller."""
 
 NOISE = 6.0
-"""Swings below so many standard deviations of white noise, but not above `RIPPLE` of the largest swing, are ripples."""
+"""Multiple of the standard deviation of white noise below which a swing is a ripple, limited to `RIPPLE` of the largest
+swing."""
 
 DEAD = 1e-9
-"""Swings below this are rounding noise, m: a run at rest on the track leaves 1e-11."""
+"""Swing below which a motion is rounding noise, m: a run at rest on the track has 1e-11 m."""
 
 
 @checked
 def hunting_frequency(t: Samples, y: Samples) -> float:
-    """Frequency of a lateral motion, from the times at which it passes the middle of its swings.
+    """Return the frequency of a lateral motion, from the times at which it passes the middle of its swings.
 
-    A swing goes from one turning point to the next. Ripples (smaller than a third of the swing beside them, or than the
-    noise of the samples) belong to the swing that they lie on. Swings below 5 % of the largest one, or below 1 nm, do
-    not count: the motion is dead, and noise remains. The middle is that of each swing, so that an offset, as in a
-    curve, has no influence.
+    A swing goes from one turning point to the next. Ripples (smaller than a third of a neighbouring swing, or smaller
+    than the noise of the samples) are part of the swing on which they lie. Swings below 5 % of the largest swing, or
+    below 1 nm, are ignored: the motion has died out and only noise remains. Each swing has its middle, so that an
+    offset, such as in a curve, has no influence.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def hunting_frequency(t: Samples, y: Samples) -> float:
 
 
 def turning_points(y):
-    """Indices of the samples at which a motion turns, with its first and its last; ripples are left out."""
+    """Return the indices of the samples at which a motion turns, without ripples, with the first and the last one."""
     y = np.asarray(y, float)
     moves = np.concatenate(([0], np.flatnonzero(np.diff(y)) + 1)) if y.size else np.zeros(0, int)  # plateaus count once
     turns = moves[np.r_[True, np.diff(np.sign(np.diff(y[moves]))) != 0.0, True]] if moves.size > 2 else moves
@@ -100,14 +101,20 @@ def turning_points(y):
 
 
 def _noise(y):
-    """Largest swing that white noise makes: `NOISE` standard deviations, from the median of second differences, whose
-    variance is 6 times that of the noise."""
+    """Return the largest swing that white noise causes: `NOISE` standard deviations of the noise.
+
+    The standard deviation is estimated from the median of second differences, whose variance is 6 times that of the
+    noise.
+    """
     return NOISE * np.median(np.abs(np.diff(y, 2))) / (0.6745 * 6.0**0.5) if y.size > 3 else 0.0
 
 
 def _passes(t, y, turns, k):
-    """Time (s) at which a motion passes the middle of its k-th swing between its ``turns``; NaN if it does not. For the
-    first and the last swing it is their neighbour's middle, unless the motion begins or ends at rest."""
+    """Return the time (s) at which a motion passes the middle of its k-th swing between its ``turns``, or NaN.
+
+    For the first and the last swing the middle of the neighbouring swing is used, unless the motion begins or ends at
+    rest.
+    """
     first, last = turns[k], turns[k + 1]
     part, at = y[first : last + 1], k
     steps = np.abs(np.diff(part))
@@ -120,13 +127,13 @@ def _passes(t, y, turns, k):
 
 
 def amplitude(y):
-    """Half of the peak-to-peak value of a motion, in its unit."""
+    """Return half of the peak-to-peak value of a motion, in the unit of ``y``; NaN without samples."""
     return 0.5 * float(np.ptp(y)) if np.size(y) else np.nan
 
 
 def growth_rate(t, y):
-    """Growth of an oscillation, 1/s: slope of the logarithm of its extrema (above 1 nm) over t (s); NaN with
-    fewer than two."""
+    """Return the growth rate of an oscillation, 1/s: slope of the logarithm of its extrema (above 1 nm) over t (s); NaN
+    with fewer than two extrema."""
     t, y = np.asarray(t), np.asarray(y)
     edges = _sign_changes(y) + 1
     tops = [start + int(np.argmax(np.abs(y[start:end]))) for start, end in zip(edges[:-1], edges[1:], strict=True)]
@@ -138,7 +145,7 @@ def growth_rate(t, y):
 
 
 def path_of(run):
-    """`PathData` of the track that a run is on, built anew of its scene; straight where that says nothing."""
+    """Build the `PathData` of a run's track from its scene; straight if the scene does not define a path."""
     track = run.scene.get("track", {})
     if track.get("path", "tangent") == "tangent" and not track.get("gradients"):
         return tangent_path()

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar in a terminal or a notebook."""
+"""Progress bars for long computations, in a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-DELAY = 1.0  # work that is done within this time shows no bar, s
+DELAY = 1.0  # a computation that takes less than this shows no bar, s
 
 
 def somebody_watches() -> bool:
-    """Whether a person sees what is printed now: a terminal or a notebook, and not ``WRCORE_PROGRESS=0``."""
+    """Whether output goes to a terminal or a notebook, and ``WRCORE_PROGRESS=0`` is not set."""
     if os.environ.get("WRCORE_PROGRESS") == "0":
         return False
     return (sys.stderr is not None and sys.stderr.isatty()) or _in_notebook()
@@ -25,8 +25,10 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[float], None] | None]:
-    """A bar over a duration (s) of simulated time from ``begin`` (s): what is to be called with the time reached (s),
-    or None where nobody watches.
+    """Show a bar over a duration (s) of simulated time from ``begin`` (s).
+
+    Yield a function that is to be called with the time reached (s), or None if output does not go to a terminal or a
+    notebook.
 
     >>> with simulated_time(10.0) as advance:
     ...     if advance:
@@ -41,15 +43,15 @@ def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[fl
 
 
 def counted(items, total: int | None = None, unit: str = "run"):
-    """Wrap an iterable in a bar, where somebody watches."""
+    """Wrap an iterable in a progress bar if output goes to a terminal or a notebook."""
     if not somebody_watches():
         return items
     return _tqdm()(items, total=total, unit=unit, delay=DELAY)
 
 
 def _tqdm():
-    """The bar of the place: widgets in a notebook that has them, else text."""
+    """Return the class of the bar: a widget in a notebook with widgets, else a line of text."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a notebook without widgets gets the text bar, which needs no remark
+        warnings.simplefilter("ignore")  # tqdm warns in a notebook without widgets, where it shows a line of text
         from tqdm.auto import tqdm
     return tqdm

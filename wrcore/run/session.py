@@ -1,9 +1,9 @@
-"""A scene that is stepped from outside: its inputs are set, its channels read, between one time and the next.
+"""Sessions: a scene that the caller steps in time, setting inputs and reading channels between the steps.
 
-The integrator goes its own way: it reaches beyond a time that is asked for, and the state there is interpolated, as at
-the output times of a run. Where no input changes, a session therefore follows the very trajectory of one run, bit by
-bit. Where one does, the integrator begins anew at that time, with the length of its next step and without the rates of
-before, so that no step runs across the change.
+The integrator chooses its steps independently of the requested times: it integrates beyond a requested time and
+interpolates the state there, as at the output times of a run. Without a change of inputs, a session is therefore
+bitwise identical to one run. At a change of an input the integrator restarts, so that no step crosses the change. It
+keeps the length of its next step and discards the earlier rates.
 """
 
 from __future__ import annotations
@@ -37,34 +37,34 @@ from wrcore.run.state import State
 from wrcore.scene.description import Source
 
 RESOLUTION = 1e-9
-"""To this a crossing is located, s."""
+"""Resolution in time with which the beginning of a condition is located, s."""
 
 PARTS = 16
-"""Of an interval in which a crossing is sought, at a time."""
+"""Number of parts into which the interval is divided in each pass of the search for the beginning of a condition."""
 
 ROUNDING = 1e-9
-"""Of an output time, over the distance of two."""
+"""Tolerance of an output time for rounding errors, relative to the distance between two output times."""
 
 STEP = Within(1e-12, 1e5, "s")
-"""Bounds of a step."""
+"""Bounds of the length of a step, s."""
 
 Values = tuple[np.ndarray, ...]
-"""Of all inputs, in their order."""
+"""Values of all inputs of a session, in the order of their names."""
 
 
 class _Output(NamedTuple):
-    """A time (s) of a session's history with the state and the inputs that held up to it."""
+    """One time (s) of a session's history, with the state there and the inputs that were applied up to it."""
 
     t: float
     state: np.ndarray
     values: Values
     is_output: bool
-    """Whether it is an output time; else it is kept while it is the last one."""
+    """Whether this is an output time; another time is kept only as long as it is the last time."""
 
 
 @dataclass(frozen=True)
 class Saved:
-    """Where a session was: everything that decides on how it goes on."""
+    """Saved condition of a session: everything that determines how it continues."""
 
     time: float
     state: np.ndarray
@@ -75,11 +75,11 @@ class Saved:
     counted: np.ndarray
     ending: tuple[str, str]
     of: object
-    """What tells the session from others."""
+    """Identity of the session, so that another session refuses to restore it."""
 
 
 class Session:
-    """A scene under way, one step at a time; :func:`start` makes one.
+    """A scene that is integrated step by step under the caller's control; :func:`start` creates one.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Session:
         self._run.without_dispatch(self._record)
         self._rate = float(self.scene.data["output"]["rate"])
         self._begin, self._most = begin, LARGEST_RUN / bytes_per_time(self.scene.vehicle)
-        self._history: Any = None  # the last `_Output` and, before it, what was the history then
+        self._history: Any = None  # linked list: (last `_Output`, earlier history)
         self._self = object()
         self.time, self._state = begin, np.array(self._run.memory.state)
         self._reach(begin)
@@ -142,21 +142,24 @@ class Session:
 
     @property
     def state(self) -> State:
-        """State at the present time, ndarray of shape (size,) as the ``end_state`` of a :class:`Run`, a start for
-        :func:`simulate`."""
+        """State at the present time, ndarray of shape (size,), in the form of the ``end_state`` of a :class:`Run`.
+        :func:`simulate` takes it as a start."""
         return self._simulation.state_at(self.time, self._state)
 
     @property
     def inputs(self) -> dict[str, float]:
-        """Present values of what :meth:`set` sets, by name: ``NAME.force`` of actuators (N), ``NAME.torque`` (N m) or
-        ``NAME.force`` (N) of motors and brakes, ``NAME.share`` of motors under the speed controller,
-        ``controller.speed`` (m/s), ``.limit`` and ``.brake_limit`` (N), ``friction.left`` and ``friction.right`` where
-        the scene tells the rails apart. NaN while a table of the scene rules."""
+        """Present values of the inputs that :meth:`set` sets, by name.
+
+        ``NAME.force`` of actuators (N), ``NAME.torque`` (N m) or ``NAME.force`` (N) of motors and brakes,
+        ``NAME.share`` of motors under the speed controller, ``controller.speed`` (m/s), ``.limit`` and
+        ``.brake_limit`` (N), ``friction.left`` and ``friction.right`` if the scene has a coefficient per rail. NaN
+        while a table of the scene determines the value.
+        """
         return {name: item.value for name, item in self._inputs.items()}
 
     @property
     def meanings(self) -> dict[str, str]:
-        """What each input is, with its unit."""
+        """Meaning and unit of each input, by name."""
         return {name: f"{item.meaning}, {item.unit}" for name, item in self._inputs.items()}
 
     @checked
@@ -168,12 +171,12 @@ class Session:
         name : str
             One of ``inputs``.
         value : float
-            In the input's unit. The value that it has already changes nothing, not even a bit.
+            In the input's unit. If it is the present value, the results stay bitwise identical.
 
         Raises
         ------
         InputError
-            If there is no such input, or the value is none for it.
+            If there is no such input, or the value is outside its bounds.
         """
         item = self._input(name)
         if not item.low <= value <= item.high:
@@ -183,20 +186,21 @@ class Session:
             self._values = self._present_values()
 
     def step(self, dt: float, inputs: Mapping[str, float] | None = None) -> None:
-        """Go on by a time.
+        """Integrate by one step of length ``dt``.
 
         Parameters
         ----------
         dt : float
-            s, 1e-12 to 1e5. A time that but for rounding is a whole multiple of it becomes just that, as output times
-            of runs are.
+            Length of the step, s, 1e-12 to 1e5. If the time reached is an integer multiple of it up to rounding errors,
+            it becomes exactly this multiple, like the output times of runs.
         inputs : dict of str to float, optional
-            Inputs to be set before, by name.
+            Inputs that are set before the step, by name.
 
         Raises
         ------
         InputError
-            If the session has ended, for a time that is none, and as :meth:`set`; then no input is changed.
+            If the session has ended, if ``dt`` is out of range, or if :meth:`set` refuses an input; then no input is
+            changed.
         """
         if type(dt) is not float or not STEP.low <= dt <= STEP.high:
             dt = check_number(dt, STEP.low, STEP.high, "session", "dt", "s")
@@ -206,7 +210,7 @@ class Session:
         self._reach(self._after(dt))
 
     def _set_all(self, inputs):
-        """Set all of some inputs, or none of them where one is refused."""
+        """Set several inputs, or none of them if one is refused."""
         if not isinstance(inputs, Mapping):
             raise InputError("session", "inputs", f"expected values by names, got {short(inputs)}")
         before, values = self._present_values(), self._values
@@ -220,13 +224,13 @@ class Session:
 
     @checked
     def channels(self, *names: str) -> dict[str, float]:
-        """Present values, by the names that they have in a table of a run.
+        """Return present values of channels by their column names in a table of a run.
 
         Parameters
         ----------
         *names : str
-            Such as ``wheelset.y_m`` or ``wheelset/left.N_N.0`` (of the wheel's first patch), or what follows from the
-            contacts, ``wheelset/left.Q_N``. Without any: all that the scene's ``output.channels`` ask for.
+            Such as ``wheelset.y_m`` or ``wheelset/left.N_N.0`` (the wheel's first patch), or channels that are derived
+            from the contacts, ``wheelset/left.Q_N``. Without names: all channels of the scene's ``output.channels``.
 
         Returns
         -------
@@ -247,7 +251,7 @@ class Session:
         return {name: value_of(run, name) for name in names}
 
     def save(self) -> Saved:
-        """Keep where the session is, for :meth:`restore`."""
+        """Return the present condition of the session, for :meth:`restore`."""
         run, ending = self._run, (self.status, self.reason)
         return Saved(
             self.time, self._state, copy.deepcopy(run.checkpoint(self.time)), self._values, self._held,
@@ -255,17 +259,17 @@ class Session:
         )  # fmt: skip
 
     def restore(self, saved: Saved) -> None:
-        """Return to where this session was; it goes on from there bit by bit as it did then.
+        """Return to a saved condition of this session; the continuation is bitwise identical to the first one.
 
         Parameters
         ----------
         saved : Saved
-            What :meth:`save` of this session has returned, as often as one likes.
+            Result of :meth:`save` of this session; it can be restored any number of times.
 
         Raises
         ------
         InputError
-            For anything else.
+            If ``saved`` is anything else, or from another session.
         """
         if not isinstance(saved, Saved) or saved.of is not self._self:
             raise InputError("session", "saved", "expected what this session's save returned")
@@ -283,18 +287,18 @@ class Session:
         dt: Annotated[float, STEP] = 0.01,
         latest: Annotated[float, Within(0.0, 1e6, "s")] = 100.0,
     ) -> bool:
-        """Step on to a time, or until a condition holds, which is located to a nanosecond.
+        """Step to a time, or until a condition holds; the time of the latter is located to a nanosecond.
 
         Parameters
         ----------
         end : float, str or callable
             A time, s; a condition such as ``"wheelset.y_m > 0.004"`` (a name of :meth:`channels`, ``<`` or ``>``, a
-            number); or a function of all :meth:`channels`, and of what follows from them, that says whether it holds.
-            It is seen if it holds at the end of a step. Where it holds already, the session stays.
+            number); or a function of all :meth:`channels`, stored and derived, that returns whether the condition
+            holds. A condition is tested at the end of each step. If it holds already, the session does not step.
         dt : float
             Length of the steps, s.
         latest : float
-            Time at which a condition is given up, s.
+            Time at which the session stops if the condition has not been met, s.
 
         Returns
         -------
@@ -304,12 +308,13 @@ class Session:
         Raises
         ------
         InputError
-            For a text that is no condition, a channel that there is not, a function that returns neither True nor
-            False, or if the session has ended before.
+            If a text is not a condition, a channel does not exist, a function returns neither True nor False, or the
+            session has ended before.
 
         Notes
         -----
-        A function is called several times where its condition begins to hold: it should depend on nothing else.
+        A function is called several times near the time at which its condition begins to hold. It should depend on the
+        channels only.
         """
         if not isinstance(end, str) and not callable(end):
             while self.time < end and self.status == "running":
@@ -327,20 +332,20 @@ class Session:
         return True
 
     def run(self) -> Run:
-        """Everything so far as a run.
+        """Return the session from its beginning to the present time as a run.
 
         Returns
         -------
         Run
             Output times are those of :func:`simulate`: multiples of 1/``output.rate``, the beginning and the present
-            time, whatever the steps were. Each time with the inputs that held up to it. ``status`` is ``completed``
-            while the session is running. The ``end_state`` is a start for any run, ``end`` for one whose scene says
-            what the inputs are now.
+            time, independent of the steps. Channels of each time use the inputs that were applied up to it. ``status``
+            is ``completed`` while the session is running. Any run can start from ``end_state``. A run can start from
+            ``end`` only if its scene contains the present values of the inputs.
 
         Raises
         ------
         InputError
-            If the session keeps no record.
+            If the session was started with ``record=False``.
         """
         if not self._recorded:
             raise InputError("session", "run", "expected a session that keeps a record of its steps")
@@ -377,7 +382,7 @@ class Session:
         return simulation.run_of(whole, float(whole.t[0]), 0.0, joined, limits)
 
     def _equations_of_outputs(self):
-        """Apart from those of the integration, whose scratch arrays are part of what it goes on from."""
+        """Return equations for outputs; those of the integration hold scratch arrays that it continues from."""
         self._outputs = self._outputs or Equations(self._simulation.model)
         return self._outputs
 
@@ -396,7 +401,7 @@ class Session:
             item.places[:] = numbers
 
     def _settle(self):
-        """Let the integrator begin anew where inputs are others than those up to now."""
+        """Restart the integrator if inputs differ from the values that were applied up to the present time."""
         if self._values is self._held:
             return
         if all(map(np.array_equal, self._values, self._held)):
@@ -404,12 +409,12 @@ class Session:
             return
         self._run.begin_anew(self.time, self._state)
         first, before = self._history
-        if before is None:  # nothing has happened yet: they hold from the beginning
+        if before is None:  # no step has been made: the inputs apply from the beginning
             self._history = first._replace(values=self._values), None
         self._held = self._values
 
     def _reach(self, t):
-        """Integrate to a time (s) and keep what is there."""
+        """Integrate to a time (s) and add the states at its output times to the history."""
         if self.status != "running":
             self._check_running()
         if self._values is not self._held:
@@ -420,10 +425,10 @@ class Session:
             outcome = self._run.advance(record, CHUNK)
             while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
                 outcome = self._run.advance(record, min(CHUNK, self._headway.attempts_left()))
-        except BaseException:  # Ctrl-C: the session stays where it was
+        except BaseException:  # Ctrl-C: the session keeps its time and state
             if before is None:
                 self._run.begin_anew(self.time, self._state)
-            else:  # in a plain Python law: no kernel was left halfway
+            else:  # in a plain Python law: no kernel was interrupted
                 self._run.go_on_from(before)
             raise
         times = record.times[: record.reached[0]].tolist()
@@ -441,7 +446,7 @@ class Session:
             raise InputError("session", "", expected)
 
     def _record_to(self, t):
-        """A record of the output times from here on to a time (s), and of this."""
+        """Return an empty record for the output times between the present time and a time (s), and for this time."""
         first = math.floor(self.time * self._rate + ROUNDING) + 1
         count = math.ceil(t * self._rate - ROUNDING) - first
         if not self._recorded or self._history is None or count <= 0:
@@ -453,24 +458,24 @@ class Session:
         return self._run.record(np.append(np.arange(first, first + count) / self._rate, t))
 
     def _after(self, dt):
-        """The time a step (s) ahead; but for rounding a whole multiple of it, or an output time, where it is one."""
+        """Return the time one step (s) ahead, rounded to a multiple of the step or an output time if it is close."""
         t, rate = on_grid(self.time + dt, dt), self._rate
         near = round(t * rate) / rate
         return near if abs(near - t) <= ROUNDING * min(dt, 1.0 / rate) else t
 
     def _is_output(self, t):
-        """Whether a time (s) is an output time but for rounding."""
+        """Whether a time (s) is an output time up to rounding errors."""
         return abs(t * self._rate - round(t * self._rate)) <= ROUNDING
 
     def _keep(self, t, state, is_output):
-        """Add a time (s) to the history; a step's end that is no output time goes when the next one comes."""
+        """Add a time (s) to the history; it replaces the last entry if that is not an output time."""
         before = self._history if self._recorded else None
         if before is not None and before[1] is not None and not before[0].is_output:
             before = before[1]
         self._history = _Output(t, state, self._held, is_output), before
 
     def _steps(self):
-        """All output times so far, in their order."""
+        """Return all entries of the history, in order of time."""
         steps, rest = [], self._history
         while rest is not None:
             step, rest = rest
@@ -478,7 +483,7 @@ class Session:
         return steps[::-1]
 
     def _locate(self, before, holds):
-        """Go to where something begins to hold, after where the session was ``before``, at which it does not."""
+        """Go to the time at which a condition begins to hold, after the saved condition ``before`` of the session."""
         low, high = before.time, self.time
         while high - low > RESOLUTION:
             self.restore(before)
@@ -492,7 +497,7 @@ class Session:
 
 
 def _times_and_states(items):
-    """Of pieces of a session's history, (n,) and (n, size)."""
+    """Return times (n,), s, and states (n, size) of entries of a session's history."""
     return np.array([item.t for item in items]), np.array([item.state for item in items])
 
 
@@ -504,24 +509,25 @@ def start(
     record: bool = True,
     **changes: Any,
 ) -> Session:
-    """Begin a scene that is then stepped from outside.
+    """Start a session: a scene that the caller steps in time.
 
     Parameters
     ----------
     scene, overrides, start, **changes
-        As for :func:`simulate`; ``integration.duration`` does not count.
+        As for :func:`simulate`; ``integration.duration`` is ignored.
     record : bool
-        Whether all steps are kept for :meth:`Session.run`; one of a coach takes 1 kB.
+        Whether all steps are kept for :meth:`Session.run`; a step of a coach takes 1 kB.
 
     Returns
     -------
     Session
-        At its first time.
+        The session at its first time.
 
     Raises
     ------
     InputError
-        One line that names the file, the field and what was expected; also for the methods of other libraries.
+        One line that names the file, the field and the expected value. Integration methods of other libraries are
+        refused, too.
 
     Examples
     --------

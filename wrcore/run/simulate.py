@@ -1,4 +1,4 @@
-"""From scenes to runs."""
+"""Simulate scenes in memory and return their runs."""
 
 from __future__ import annotations
 
@@ -37,35 +37,35 @@ def simulate(
     start: Annotated[Checkpoint | np.ndarray | Literal["initial"], STARTS] = "initial",
     **changes: Any,
 ) -> Run:
-    """Run a scene.
+    """Simulate a scene and return its run.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        From :func:`wrcore.load_scene`, or what that function takes.
+        Result of :func:`wrcore.load_scene`, or a path or dict that this function accepts.
     overrides : sequence of str, or dict
         ``key.path=value``, or values by ``key.path``, as :func:`wrcore.load_scene` takes them.
     progress : callable or False, optional
-        Called now and then with the simulated time reached, s. Left out: a bar where the run takes more than a second
-        and somebody watches (a terminal or a notebook, not a log); False: none.
+        Called at intervals with the simulated time reached, s. By default a bar is shown if the run takes more than a
+        second and output goes to a terminal or a notebook; False: no bar.
     start : Checkpoint, ndarray of shape (size,), or "initial"
-        Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
-        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit, which
-        on another processor it is not), its ``end_state``, which knows its time and where the moving frame is (the
-        same vehicle; all else may differ), or an array as a state at time 0. The scene's ``initial`` does not count
-        then.
+        State in which the run begins, if it is not the scene's initial state; then ``initial`` of the scene is ignored.
+        The ``end`` of an earlier run continues this run at its time, and the results are bitwise identical to those of
+        a run without the stop. This requires the same method and a bitwise identical model; a model compiled on another
+        processor is not identical. The ``end_state`` of an earlier run contains its time and the position of the moving
+        frame; only the vehicle must be the same. A plain array is a state at time 0.
     **changes
         Further values by key, as :func:`wrcore.load_scene` takes them.
 
     Returns
     -------
     Run
-        Whatever happened is in ``status`` and ``reason``; what was reached is kept.
+        Its ``status`` and ``reason`` say how it ended. A run that ended early contains the results up to its end.
 
     Raises
     ------
     InputError
-        One line that names the file, the field and what was expected.
+        One line that names the file, the field and the expected value.
 
     Examples
     --------
@@ -89,8 +89,8 @@ def simulate(
 
 
 def opened(source: str, scene: Source, overrides: Any, start: Any, changes: dict[str, Any]) -> tuple[Scene, Any, float]:
-    """What `simulate` is given as a checked scene, where a `Simulation` begins and at which time (s); ``source`` is
-    named in errors.
+    """Return the checked scene, the start of a `Simulation` (None: initial state) and its time (s) from arguments of
+    `simulate`; errors name ``source``.
     """
     begin_at = None if isinstance(start, str) and start == "initial" else start
     overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
@@ -107,20 +107,20 @@ def simulate_many(
     progress: Callable[[Sequence[Source]], Iterable[Source]] | Literal[False] | None = None,
     threads: Threads = 1,
 ) -> list[Run]:
-    """Run several scenes in one process, which imports, loads kernels and reads tables only once.
+    """Simulate several scenes in one process, which imports, loads kernels and reads tables only once.
 
     Parameters
     ----------
     scenes : sequence of Scene, path or dict
     progress : callable or False, optional
-        Wraps the sequence of scenes, e.g. ``tqdm.tqdm``. Left out: a bar as for :func:`simulate`; False: none.
+        Wraps the sequence of scenes, e.g. ``tqdm.tqdm``. By default a bar as for :func:`simulate`; False: no bar.
     threads : int
-        Runs at the same time: the compiled part of a run lets other threads work. Results do not depend on it.
+        Number of simultaneous runs: compiled parts of a run do not block other threads. Results do not depend on it.
 
     Returns
     -------
     list of Run
-        As :func:`simulate` gives for each scene alone.
+        The results of :func:`simulate` for each scene, in their order.
 
     Examples
     --------
@@ -136,17 +136,17 @@ def simulate_many(
         return [run for _, run in zip(bar(scenes), runs, strict=True)]
 
 
-LARGEST_RUN = 4e9  # channels of a run that is kept in memory take no more than this, bytes
+LARGEST_RUN = 4e9  # limit of the size of the channels of a run in memory, bytes
 
 
 def bytes_per_time(vehicle):
-    """Memory that the channels of one output time take."""
+    """Return the memory that the channels of one output time take, bytes."""
     patches = len(vehicle.bodies.wheelsets) * 2 * reduction.MAX_PATCHES * reduction.PATCH_COLUMNS
     return 8 * (STATE_SIZE * len(vehicle.body_names) + patches)
 
 
 def check_memory(scene):
-    """Refuse a run whose channels memory could not hold."""
+    """Refuse a run whose channels would exceed `LARGEST_RUN` in memory."""
     count = scene.data["integration"]["duration"] * scene.data["output"]["rate"]
     most = LARGEST_RUN / bytes_per_time(scene.vehicle)
     if count > most:
@@ -155,12 +155,13 @@ def check_memory(scene):
 
 
 def output_times(begin: float, duration: float, rate: float) -> np.ndarray:
-    """Multiples of 1/rate (1/s) from a time on, and both ends of the duration (s)."""
+    """Return output times (n,), s: multiples of 1/``rate`` (rate in 1/s) from ``begin`` (s) on, and both ends of the
+    duration (s)."""
     return np.concatenate(list(output_blocks(begin, duration, rate, 2**62)))
 
 
 def output_blocks(begin: float, duration: float, rate: float, size: int) -> Iterator[np.ndarray]:
-    """:func:`output_times` in pieces of some ``size`` (both ends come on top), none of them empty."""
+    """Yield :func:`output_times` in blocks of at most ``size`` times (plus both ends), none of them empty."""
     end, slack = begin + duration, 1e-9 * min(1.0, duration * rate)
     first, last = math.ceil(begin * rate - slack), math.floor(end * rate + slack)
 

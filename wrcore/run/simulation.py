@@ -1,4 +1,4 @@
-"""A scene under way: integrated stretch by stretch, with the channels of each."""
+"""Integrate a compiled scene section by section in time, and compute the output channels of each section."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ from wrcore.wheels.contact_model import is_elliptic, shaped
 from wrcore.wheels.motion import MOTION
 
 DERAILED_Y = 0.05
-"""A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
+"""Lateral displacement from the track's centre above which a wheelset has derailed, m (flange tip on the rail: about
+0.04 m)."""
 
 COUNTERS = {
     "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
@@ -50,17 +51,17 @@ COUNTERS = {
     "patches_on_fixed_strips": "on_fixed_strips", "patches_not_tabulated": "not_tabulated",
     "patches_outside_training": "outside_training", "rails_unbalanced": "unbalanced", "wall_s": "wall_s",
 }  # fmt: skip
-"""Counters of a run, and what a `Trajectory` calls them."""
+"""Counters of a run, with the names of the same quantities in a `Trajectory`."""
 
 TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
     "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
 )  # fmt: skip
-"""Of a flexible track, in the order of its freedoms (:mod:`wrcore.track.flexible_track`)."""
+"""Channels of a flexible track, in the order of its degrees of freedom (:mod:`wrcore.track.flexible_track`)."""
 
 
 def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
-    """Counters of a trajectory from a time (s) on by the names that they have in runs and sweeps."""
+    """Return the counters of a trajectory that begins at a time (s), by their names in runs and sweeps."""
     simulated = float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0
     return {name: getattr(trajectory, attribute) for name, attribute in COUNTERS.items()} | {"simulated_s": simulated}
 
@@ -71,24 +72,24 @@ ON_RAIL = tuple(
         "wy_rad_per_s", "wz_rad_per_s", "bend_y_per_m", "bend_z_per_m", "friction",
     )
 )  # fmt: skip
-"""Channels of a wheel's `WheelMotion` but for its side, in its order."""
+"""Channels of a wheel's `WheelMotion`, in the order of its fields, without its side."""
 
 
 class ArcLengths(NamedTuple):
-    """Arc lengths from which those of the next output are sought on a curved track, m."""
+    """Arc lengths from which the search for those of the next output starts on a curved track, m."""
 
     wheelsets: np.ndarray
-    """(k,): NaN where nothing is known yet."""
+    """Arc lengths of the wheelsets, shape (k,); NaN: not known yet."""
     bodies: np.ndarray
-    """(n,)."""
+    """Arc lengths of the bodies, shape (n,)."""
 
 
 class Simulation:
-    """A compiled scene and where it has got to: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or state
-    (size,)) of the next stretch and the ``arc_lengths`` for its channels.
+    """A compiled scene and its present condition: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or
+    state (size,)) of the next section in time and the ``arc_lengths`` for its channels.
 
-    InputError if it cannot begin there. ``progress`` wraps the patches of a creep table that has to be built,
-    ``shared`` is that of :func:`wrcore.scene.compile.compile_scene`.
+    InputError if the run cannot begin at ``start``. ``progress`` wraps the patches of a creep table that has to be
+    built; ``shared`` is passed to :func:`wrcore.scene.compile.compile_scene`.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class Simulation:
         return self.arc_lengths.bodies[self.model.bodies.wheelsets]
 
     def begin_at(self, start: Checkpoint | np.ndarray, arc_lengths: ArcLengths | None = None) -> None:
-        """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
+        """Set the start of the next section; a checkpoint must be of exactly this model and method."""
         if isinstance(start, Checkpoint):
             method = self.scene.data["integration"]["method"]
             if start.model != self.mark:
@@ -143,8 +144,9 @@ class Simulation:
         progress: Callable[[float], object] | None = None,
         stop: Callable[[], str] | None = None,
     ) -> Run:
-        """Integrate one stretch over output times (n,), s; its run alone. ``progress`` is called with the time reached
-        (s), ``stop`` gives a reason to stop or an empty string.
+        """Integrate one section over output times (n,), s, and return the run of this section.
+
+        ``progress`` is called with the time reached (s). ``stop`` returns a reason to stop or an empty string.
         """
         settings = self.scene.data["integration"]
         begin = self.start.t if isinstance(self.start, Checkpoint) else float(times[0])
@@ -169,11 +171,11 @@ class Simulation:
                 trajectory = replace(trajectory, status="failed", reason=f"{fault} at an output time", end=None)
             if found is not None or not count:
                 return trajectory, begin, compiled, *(found or ({}, {}))
-            count //= 2  # a compiled law ends the evaluation: the outputs before are kept
+            count //= 2  # a compiled law failed at an output: keep the outputs before it
             trajectory = replace(trajectory, t=trajectory.t[:count], states=trajectory.states[:count])
 
     def run_of(self, trajectory: Trajectory, begin: float, compiled: float, groups: dict, limits: dict) -> Run:
-        """The run that a trajectory from a time (s) on is, with its `channels` and seconds of compilation."""
+        """Return the run of a trajectory that begins at a time (s), with its `channels` and time of compilation (s)."""
         scene, settings = self.scene, self.scene.data["integration"]
         counters = counters_of(trajectory, begin) | {"compile_s": compiled}
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
@@ -186,26 +188,28 @@ class Simulation:
         )  # fmt: skip
 
     def observe(self, model: Model, times: np.ndarray, states: np.ndarray) -> Run:
-        """Channels of states (n, size) at times (n,), s, of a variant of the scene's model, as a run has them."""
+        """Return a run with the channels of states (n, size) at times (n,), s, of a variant of the scene's model."""
         seen = copy.copy(self)
         seen.model = model
         groups, _ = seen.channels(Trajectory("", times, states, "completed", ""))
         return Run(self.scene.data, "completed", "", times, groups)
 
     def _end_state(self, trajectory: Trajectory) -> State | None:
-        """Where the stretch ended, with what belongs to it."""
+        """Return the state at the end of a trajectory as a `State`, or None without a state."""
         return None if trajectory.end_state is None else self.state_at(trajectory.end_t, trajectory.end_state)
 
     def state_at(self, t: float, state: np.ndarray) -> State:
-        """A state at a time (s), with what belongs to it."""
+        """Return a state vector at a time (s) as a `State` with time, moving frame and names of the vehicle."""
         names = self.scene.vehicle.name, *self.scene.vehicle.body_names
         return State(state, t, self._moved + self.model.speed * t, names)
 
     def channels(
         self, trajectory: Trajectory, equations: Equations | None = None
     ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, Any]]:
-        """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs, by
-        ``equations`` of this model where they are at hand."""
+        """Return output channels by group, and counters of exceeded limits.
+
+        Contacts are evaluated again at the output times, with ``equations`` of this model if they are given.
+        """
         model, states, equations = self.model, trajectory.states, self._from_here(equations)
         evaluations = patches, _, _ = evaluated(model, trajectory, equations)
         poses, axes = self._poses(states, range(len(model.bodies.mass)))
@@ -231,8 +235,10 @@ class Simulation:
     def present(
         self, trajectory: Trajectory, asked: set[str], places: np.ndarray, equations: Equations
     ) -> dict[str, dict[str, np.ndarray]]:
-        """Channels of the groups that are asked for, with what belongs to them, by ``equations`` of this model;
-        ``places`` are arc lengths (k,) near which its wheelsets are, m."""
+        """Return channels of the requested groups, and of groups of the same bodies, with ``equations`` of this model.
+
+        ``places`` are approximate arc lengths (k,) of its wheelsets, m.
+        """
         names, wheelsets = self.scene.vehicle.body_names, self.model.bodies.wheelsets
         if len(places) and np.isfinite(places[0]):
             nominal = self.scene.vehicle.positions[:, 0]
@@ -251,11 +257,11 @@ class Simulation:
         return groups
 
     def _wants(self, *kinds: str) -> bool:
-        """Whether the scene asks for any of some kinds of channels."""
+        """Whether the scene requests at least one of some kinds of channels (``output.channels``)."""
         return not set(kinds).isdisjoint(self.scene.data["output"]["channels"])
 
     def _of_bodies(self, bodies, states, evaluations, poses, axes):
-        """Channels of bodies, by number, and of their wheels by group; what is `evaluated`, and `_poses` with axes."""
+        """Return channels of bodies, by number, and of their wheels by group, from `evaluated` and `_poses`."""
         scene, model, (patches, bounds, rates) = self.scene, self.model, evaluations
         wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
         groups, numbers = {}, {int(body): k for k, body in enumerate(wheelsets)}
@@ -285,7 +291,7 @@ class Simulation:
         return groups
 
     def _contact_channels(self, name, patches):
-        """Channels of the contacts of a wheelset's wheels by group."""
+        """Return channels of the contacts of a wheelset's wheels, by group."""
         groups = {}
         for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
             channels = {key: rows[..., column] for key, column in reduction.CHANNELS.items()}
@@ -297,7 +303,7 @@ class Simulation:
         return groups
 
     def _rolling_rates(self, states, body):
-        """Channels of the rolling rates of wheels that turn independently, rad/s."""
+        """Return channels of the rolling rates of independently rotating wheels, rad/s."""
         bodies = self.model.bodies
         j = int(np.flatnonzero(bodies.wheelsets[bodies.independent[:, 0]] == body)[0])
         part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
@@ -306,12 +312,12 @@ class Simulation:
         return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
 
     def _track_places(self, states, k):
-        """Channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
+        """Return channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
         places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
     def _add_wheel_motions(self, groups, trajectory, equations):
-        """Add channels of how wheels lie and move on their rails to those of wheels of known groups, if asked for."""
+        """Add channels of position and velocity of wheels relative to their rails, if the scene requests them."""
         if not self._wants("wheel_motion"):
             return
         motions = motion_history(self._from_here(equations), trajectory.t, trajectory.states)
@@ -321,7 +327,7 @@ class Simulation:
                 groups[f"{name}/{side}"] |= dict(zip(ON_RAIL, motions[:, k, i, MOTION.y :].T, strict=True))
 
     def _add_check_rails(self, groups, trajectory, equations):
-        """Add channels of the forces of check rails, if there are any, to those of wheelsets."""
+        """Add channels of the forces of check rails, N, to the groups of wheelsets, if the scene has check rails."""
         if not len(self.model.check_rails.rows) or not self._wants("contact"):
             return
         forces = check_rail_history(self._from_here(equations), trajectory.t, trajectory.states)
@@ -331,8 +337,8 @@ class Simulation:
                 group |= {f"check_rail_{side}_N": forces[:, k, i] for i, side in enumerate(SIDES)}
 
     def _drive_channels(self, trajectory, equations):
-        """Torque and power of motors and brakes, force and speed of the controller, outputs and states of control laws,
-        if the scene has any."""
+        """Return channels of motors and brakes (torque, power), speed controller (force, speed) and control laws
+        (outputs, states), by group; empty if the scene has none of them."""
         spec, laws = self.scene.data.get("drive") or {"motors": [], "brakes": []}, self.scene.data.get("control", {})
         if not any(spec.values()) and not laws:
             return {}
@@ -359,15 +365,15 @@ class Simulation:
         return work
 
     def _from_here(self, equations, model=None):
-        """Equations, new ones of a model where there are none, that seek arc lengths near those of the last output."""
+        """Return equations that search arc lengths near those of the last output; new ones if none are given."""
         if equations is None:
             return Equations(model or self.model, self._workspace())
         equations.work.arc_lengths[:] = self.arc_lengths.wheelsets
         return equations
 
     def _poses(self, states, bodies):
-        """Arc length, y, z, roll, yaw and pitch of bodies, by number, in the track's axes, (n, all bodies, 6), and
-        these axes."""
+        """Return arc length, y, z, roll, yaw and pitch of bodies in the track's axes, shape (n, all bodies, 6), and
+        these axes, shape (n, all bodies, 3, 3); only the bodies with the given numbers are filled."""
         count = len(self.model.bodies.mass)
         poses, axes = np.empty((len(states), count, 6)), np.broadcast_to(np.eye(3), (len(states), count, 3, 3))
         if not self.model.track.tangent:
@@ -385,10 +391,10 @@ class Simulation:
 def evaluated(
     model: Model, trajectory: Trajectory, equations: Equations | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the equations of motion again at a run's output times, by ``equations`` of this model where they are at
-    hand, arc lengths sought near those of their work: patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left
-    first, NaN where absent; bounds (n, wheelsets, 2) of planar detection's error (``auto`` only), m; rates (n, size),
-    derivatives of the states.
+    """Evaluate the equations of motion again at a run's output times, with ``equations`` of this model if given.
+
+    Return patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left first, NaN where absent; bounds (n, wheelsets, 2)
+    of planar detection's error (``auto`` only), m; rates (n, size), time derivatives of the states.
     """
     shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
@@ -399,7 +405,7 @@ def evaluated(
 
 
 def _body_channels(state, rate, pose, axes, wanted, pitches=False):
-    """Channels of a body in the axes of the track where it is; one that spins has no pitch."""
+    """Return channels of a body in the axes of the track at its position; a spinning body has no pitch."""
     channels: dict[str, np.ndarray] = {}
     if "pose" in wanted:
         names = ("x_m", "y_m", "z_m", "roll_rad", "yaw_rad", *(("pitch_rad",) if pitches else ()))
@@ -413,7 +419,7 @@ def _body_channels(state, rate, pose, axes, wanted, pitches=False):
 
 
 def flat(settings, prefix=""):
-    """Nested settings as one level, keys joined by dots."""
+    """Return nested settings as a dict of one level, with keys joined by dots."""
     out: dict[str, Any] = {}
     for key, value in settings.items():
         out |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}

@@ -1,4 +1,4 @@
-"""The state in which a run ended, with all that its numbers do not say: time, moving frame, whose it is."""
+"""State in which a run ended, with its time, the position of the moving frame and the names of its vehicle."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from wrcore.geometry.path import arc_length_of
 from wrcore.vehicle.description import Vehicle
 
 REACH = 1.0
-"""At time 0 what elements hold to the moving frame is this near to its nominal place along the track, m (chosen)."""
+"""Largest distance along the track at time 0 between a body that elements connect to the moving frame and its nominal
+position, m (chosen)."""
 
 
 class State(np.ndarray):
-    """A state vector that knows its time ``t`` (s), the arc length ``frame`` (m) that the moving frame has gone, and
-    the names of the ``vehicle`` and its bodies (empty: not known); what is computed from it does, too.
+    """State vector with its time ``t`` (s), the arc length ``frame`` (m) that the moving frame has travelled, and the
+    names of the ``vehicle`` and its bodies (empty: not known). Arrays computed from it carry these attributes, too.
     """
 
     t: float = 0.0
@@ -39,8 +40,10 @@ class State(np.ndarray):
 
 
 def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -> Model:
-    """The model with its moving frame where a state has it; a plain array is one at time 0, the frame at its beginning.
-    InputError for a state of another vehicle, or an array of bodies that are elsewhere.
+    """Return the model with its moving frame at the position of a state.
+
+    A plain array is a state at time 0, with the frame at its initial position. InputError if the state is of another
+    vehicle, or if the bodies of a plain array are too far from their nominal positions.
     """
     if not isinstance(state, State):
         _check_position(model, vehicle, state, source)
@@ -59,9 +62,9 @@ def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -
 
 
 def _check_position(model, vehicle, state, source):
-    """Refuse an array whose bodies are not beside the frame, to which elements hold them, at its beginning."""
+    """Refuse an array at time 0 if bodies connected to the moving frame are more than `REACH` away from it."""
     if np.shape(state) != (state_size(model),) or np.asarray(state).dtype.kind not in "fiu":
-        return  # no state at all: the integrator says so
+        return  # not a state at all: the integrator refuses it
     for body in model.elements.pairs[model.elements.pairs[:, 1] == FRAME, 0]:
         s = arc_length_of(model.track.path, *np.asarray(state, float)[STATE_SIZE * body :][:3], np.nan)
         if abs(s - vehicle.positions[body, 0]) > REACH:

@@ -1,12 +1,12 @@
-"""Runs of any length: written as they go, kept when they are interrupted, taken up again where they were.
+"""Simulate runs of any length: write them to disk in blocks, keep interrupted runs and resume them.
 
-A run is integrated in blocks of output times. What does not fit into one block, or takes longer than a minute, is
-written block by block into a folder beside the file (``.run.h5.parts``), each block a run file of its own with a
-checkpoint, renamed when it is complete. At the end the blocks become the run file and the folder goes. A process that
-is killed, or finds the disk full, leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file
-with what was reached. The same command goes on from either, bit by bit as if nothing had happened: blocks do not change
-a result. Neither of them is used if anything decisive is different: the compiled model, integration, output, or the
-sources of the kernels; of damaged blocks, those before the first one are.
+A run is integrated in blocks of output times. A run that exceeds one block or takes longer than a minute is written
+block by block into a folder next to the file (``.run.h5.parts``). Each block is a complete run file with a checkpoint
+and gets its name when it is complete. At the end the blocks are joined to the run file and the folder is removed. If
+the process is killed or the disk is full, the folder remains. After SIGINT or SIGTERM the run file contains the results
+up to the stop. The same command resumes the run from either. The results are bitwise identical to those of a run
+without interruption. Blocks are not used if the compiled model, integration, output or the sources of the kernels
+differ. If a block is damaged, the blocks before it are used.
 """
 
 from __future__ import annotations
@@ -39,23 +39,25 @@ from wrcore.run.simulation import ArcLengths, Simulation
 from wrcore.scene.description import Scene
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
-"""Size of a block's channels in memory, bytes, and its number of output times at most."""
+"""Largest size of a block's channels in memory, bytes, and largest number of its output times."""
 
 WHOLE = 2**62  # output times in a block that holds all of them
 
 STOP, INTERRUPTED = "stop", "interrupted"
-"""Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""
+"""Reason of a block that ends for a checkpoint, and first word of the reason of an interrupted run."""
 
 PATIENCE = 10.0
-"""Time within which an interrupted run ends, s: an attempt of a step with exact patches takes up to half a second, a
-block of channels as much to write. With less a second Ctrl-C loses up to a minute of work."""
+"""Time after a first signal in which a second one is ignored, s. In this time the run ends: an attempted step with
+exact patches and writing a block take up to half a second each. With less time a second Ctrl-C loses up to a minute."""
 
-CHECKPOINT_S = 60.0  # wall time between two checkpoints at most, s
+CHECKPOINT_S = 60.0  # longest wall time between two checkpoints, s
 
 
 class Interrupts:
-    """SIGINT and SIGTERM as a question: ``caught`` is the signal's number or 0. One that follows `PATIENCE` later does
-    as ever; before, what was computed is being written."""
+    """Context that catches SIGINT and SIGTERM: ``caught`` is the signal's number or 0.
+
+    A second signal within `PATIENCE` is ignored, while results are written. Later it has its usual effect.
+    """
 
     caught, since = 0, 0.0
 
@@ -87,20 +89,20 @@ def simulate_to(
     block: int | None = None,
     record: dict[str, Any] | None = None,
 ) -> tuple[Run, int]:
-    """Run a scene with bounded memory, its channels going to the run file ``path`` (None: counters only): the run, with
-    the channels of the last block only, and the number of the signal that interrupted it, or 0.
+    """Simulate a scene with bounded memory and write its channels to the run file ``path`` (None: counters only).
 
-    An interrupted run of the same scene goes on unless ``resume`` is False; ``say`` is told of that and of what is
-    damaged. ``progress`` is called with the simulated time reached (s), ``checkpoint_s`` is the longest wall time
-    between checkpoints, ``block`` the output times in a block, ``record`` further settings to keep. InputError if
-    another process writes the same file; OSError names the file where the disk is full, with the blocks kept.
+    Return the run, with the channels of the last block only, and the number of the signal that interrupted it, or 0.
+    An interrupted run of the same scene is resumed unless ``resume`` is False; ``say`` reports this, and damaged files.
+    ``progress`` is called with the simulated time reached (s). ``checkpoint_s`` is the longest wall time between
+    checkpoints, s; ``block`` the number of output times in a block; ``record`` further settings to store. InputError
+    if another process writes the same file; OSError names the file if the disk is full, and the blocks are kept.
     """
     settings = scene.data["integration"]
     check_reach(scene, settings["duration"])
     simulation = Simulation(scene)
     if settings["method"] not in REFERENCES:
         size = block or _block_size(simulation)
-    else:  # methods of other libraries have no checkpoints
+    else:  # integration methods of other libraries have no checkpoints
         check_memory(scene)
         size = WHOLE
     summary, blocks = Summary(), None
@@ -132,26 +134,27 @@ def _stop(interrupts, deadline):
 
 
 def _block_size(simulation):
-    """Output times whose channels take `BLOCK_BYTES` at most, and at least one."""
+    """Return the number of output times of a block: its channels take at most `BLOCK_BYTES`; at least 1."""
     return max(1, min(LONGEST_BLOCK, int(BLOCK_BYTES / bytes_per_time(simulation.scene.vehicle))))
 
 
 def fingerprint(simulation):
-    """Digest of everything that decides on the bits of a run's channels: model, start, settings, sources of kernels."""
+    """Return the digest of all inputs that determine a run's channels: model, start, settings, sources of kernels."""
     data = simulation.scene.data
     settings = json.dumps([data["integration"], data["output"]], sort_keys=True)
     return digest_of((simulation.start,), source_digest(), simulation.mark, settings).hexdigest()
 
 
 class Summary:
-    """The blocks of a run: reach (``t``, s), cost, the ``last`` one, and whether it is ``over`` before its duration."""
+    """Summary of a run's blocks: time reached (``t``, s), counters, ``last`` block, and ``over``: whether the run ended
+    before its duration."""
 
     def __init__(self):
         self.first, self.t, self.over, self.last = math.nan, -math.inf, False, None
         self.counters = {}
 
     def add(self, run, interrupted=0):
-        """Add a block; one that was stopped for a checkpoint, and not by a signal, is not the end."""
+        """Add a block; a block that ended for a checkpoint, without a signal, does not end the run."""
         if run.reason == STOP:
             run.status, run.reason = "completed", ""
         if interrupted and run.status == "completed":
@@ -172,14 +175,15 @@ class Summary:
                 self.counters.setdefault(name, value)
 
     def run(self):
-        """The last block with the counters of all."""
+        """Return the last block with the counters of all blocks."""
         self.last.counters = {"compile_s": 0.0, **self.counters, "simulated_s": self.t - self.first}
         return self.last
 
 
 class Blocks:
-    """The ``count`` blocks of the run with a fingerprint (``mark``), numbered from 0 without a gap in a folder beside
-    its file; ``say`` is told of damaged ones.
+    """Blocks of the run with the fingerprint ``mark``, in a folder next to its file.
+
+    There are ``count`` blocks, numbered from 0 without a gap; ``say`` reports damaged blocks.
     """
 
     def __init__(self, path, mark, say=lambda text: None):
@@ -204,8 +208,9 @@ class Blocks:
         return self.folder / f"{number:06d}.h5"
 
     def take_up(self, simulation, summary, resume):
-        """Put a simulation where an interrupted run of the same scene has got to; False if there is none to go on with.
-        Everything is read before anything is moved or removed.
+        """Set a simulation to the end of an interrupted run of the same scene; return False if there is no such run.
+
+        All files are read before any file is moved or removed.
         """
         files, gap = sorted(self.folder.glob("[0-9]*.h5")), 1.5 / simulation.scene.data["output"]["rate"]
         kept = self._readable(files, gap) if resume else []
@@ -227,7 +232,7 @@ class Blocks:
         return bool(kept)
 
     def _readable(self, files, gap):
-        """Runs and places of the blocks that can be gone on from, up to the first that cannot."""
+        """Return runs and arc lengths of the blocks up to the first block that cannot be used."""
         kept, reached = [], -0.5 * gap
         for number, file in enumerate(files):
             if not file.exists() or file not in (self.path, self._part(number)):
@@ -244,7 +249,7 @@ class Blocks:
         return kept
 
     def add(self, run, simulation, last):
-        """Write a block: as a part, or as the run file if it is the only one."""
+        """Write a block: as a part, or as the run file if it is the only block."""
         also = partial(write_going_on, mark=self.mark, places=simulation.arc_lengths)
         with self._told():
             if last and not self.count:
@@ -255,7 +260,7 @@ class Blocks:
             self.count += 1
 
     def join(self, summary):
-        """Make the run file of the blocks and remove them."""
+        """Join the blocks to the run file and remove their folder."""
         if self.count:
             with self._told():
                 join_runs(self.path, [self._part(number) for number in range(self.count)], summary.run().counters)
@@ -264,7 +269,7 @@ class Blocks:
 
     @contextmanager
     def _told(self):
-        """A disk that is full is told of the run file, with what is kept."""
+        """Re-raise an OSError (disk full) with the name of the run file and the number of blocks that are kept."""
         try:
             yield
         except OSError as error:

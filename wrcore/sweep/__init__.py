@@ -1,1 +1,1 @@
-"""Many runs of one scene: the plan, its batches, what is kept of each run."""
+"""Parameter sweeps: many runs of one scene, their plan, their batches and the measures of each run."""

@@ -1,7 +1,7 @@
-"""Running a sweep: many runs in one process, a number per measure from each, one tidy table in the end.
+"""Run a sweep: many runs in one process, one number per measure of each run, and one table of all runs.
 
-What all runs of a batch have in common is made once: imports, kernels, profiles, contact geometry, creep table, static
-equilibrium. A run then costs its integration and two to four milliseconds (reports/sweeps.md).
+Parts that all runs of a batch have in common are built once: imports, kernels, profiles, contact geometry, creep table,
+static equilibrium. A run then costs its integration and two to four milliseconds (reports/sweeps.md).
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 _SEALED = "# seal of this part: "
 _KIND = "a sweep's table (CSV or HDF5)"
 
-CHUNK = 200  # runs whose motions are held at a time
-AHEAD = 20  # runs per thread whose parts are made before they begin
+CHUNK = 200  # number of runs whose motions are in memory at a time
+AHEAD = 20  # number of runs per thread that are prepared before they begin
 
 
 def column_unit(name: str) -> str:
-    """Unit of a column of a sweep's table: that of the scene's key, or what the name of a measure says."""
+    """Return the unit of a column of a sweep's table, from the scene's key or the name of the measure."""
     return unit_of_key(name) or unit_of(name)
 
 
@@ -77,25 +77,26 @@ def run_sweep(
     threads: Threads = 1,
     progress: Callable[[Iterable], Iterable] | None = None,
 ) -> pd.DataFrame:
-    """Run a whole sweep in this process.
+    """Run all runs of a sweep in this process and return their table.
 
     Parameters
     ----------
     source : str, Path, dict or Sweep
-        As :func:`wrcore.sweep.plan.load_sweep` takes it.
+        Sweep, or a file or dict for :func:`wrcore.sweep.plan.load_sweep`.
     threads : int
-        Runs at the same time; the table does not depend on it.
+        Number of simultaneous runs; the table does not depend on it.
     progress : callable, optional
-        Wraps the runs, e.g. ``tqdm.tqdm``. Left out: a bar where somebody watches.
+        Wraps the runs, e.g. ``tqdm.tqdm``. By default a bar is shown in a terminal or a notebook.
 
     Returns
     -------
     pandas.DataFrame
-        A row per run: ``run``, the keys, ``status``, ``method`` and the measures (names carry the unit, SI).
+        A row per run: ``run``, the keys, ``status``, ``method`` and the measures in SI units, which their names state.
 
     Raises
     ------
     InputError
+        One line that names the file, the field and the expected value.
 
     Examples
     --------
@@ -134,14 +135,14 @@ def run_rows(
 
 
 def _some_at_a_time(pool: ThreadPoolExecutor, work: Callable, tasks: Iterator[_Task], count: int) -> Iterator[_Outcome]:
-    """What a pool makes of tasks, so many at a time: its map takes all that it is given at once."""
+    """Yield the results of a pool for tasks in groups of ``count``, because its map would create all tasks at once."""
     while part := list(itertools.islice(tasks, count)):
         yield from pool.map(work, part)
 
 
 def _tasks(sweep: Sweep, rows: pd.DataFrame) -> Iterator[_Task]:
-    """One task per run; runs that are made of the same parts share them, and come one after the other: parts are made
-    when they are needed, and kept no longer.
+    """Yield one task per run. Runs with the same parts follow each other and share them, so that parts are built when
+    needed and then released.
     """
     parts = [key for key in rows.columns if of_parts(key)]
     groups: dict[str, list[tuple[int, dict[str, Any]]]] = {}
@@ -157,7 +158,7 @@ def _tasks(sweep: Sweep, rows: pd.DataFrame) -> Iterator[_Task]:
 
 
 def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
-    """A scene with other values of keys that need nothing read anew; they have been checked before."""
+    """Return a scene with other values of keys that do not require reading files; the values are already checked."""
     data = scene.data
     for key, value in values.items():
         data = with_value(data, key, value)
@@ -165,7 +166,7 @@ def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
         data = copy.deepcopy(data)
         leave_out_void_keys(data, scene.source, values)
     changed = dataclasses.replace(scene, data=data)
-    vars(changed)["alike"] = scene.alike  # made of parts that are shared
+    vars(changed)["alike"] = scene.alike  # shared by runs with the same parts
     return changed
 
 
@@ -193,13 +194,13 @@ def _times(duration: float, rate: float) -> np.ndarray:
 
 
 def _alike(one: _Outcome, other: _Outcome) -> bool:
-    """Whether the motions of two runs fit into one array."""
+    """Whether two runs have the same output times and number of wheelsets, so that one array can hold their motions."""
     alike = one.times is other.times or np.array_equal(one.times, other.times)
     return alike and one.motion.shape[1] == other.motion.shape[1]
 
 
 def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
-    """Measures of runs with the same output times, a row per run."""
+    """Return the measures of runs with the same output times as a table with a row per run."""
     times = outcomes[0].times
     records = [outcome.record for outcome in outcomes]
     table: dict[str, Any] = {name: [record[name] for record in records] for name in ("status", "method")}
@@ -209,7 +210,7 @@ def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
         forces = _stacked([outcome.forces for outcome in outcomes], len(times))[:, late]
     motions = Motions(times[late], motion[..., 0], motion[..., 1], forces, sweep.data["window"])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # all NaN: a run that ended before ``begin`` has no measure
+        warnings.simplefilter("ignore", RuntimeWarning)  # a run that ended before ``begin`` has only NaN
         for name in sweep.data["measures"]:
             if name in COUNTERS:
                 table[name] = [record[name] for record in records]
@@ -219,7 +220,7 @@ def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
 
 
 def _stacked(parts: list, length: int) -> np.ndarray:
-    """Runs on top of one another, filled up with NaN where they ended early."""
+    """Stack arrays of runs, shape (runs, length, ...), padded with NaN after the end of a run."""
     if all(len(part) == length for part in parts):
         return np.stack(parts)
     out = np.full((len(parts), length, *parts[0].shape[1:]), np.nan)
@@ -234,12 +235,12 @@ def sweep_to_file(
     threads: int = 1,
     progress: Callable[[Iterable], Iterable] | None = None,
 ) -> None:
-    """Run a sweep batch by batch and write its table, CSV or ``.h5``; ``threads`` and ``progress`` as for
-    :func:`run_sweep`.
+    """Run a sweep batch by batch and write its table, CSV or ``.h5``.
 
-    Finished batches wait beside it in a folder whose name tells what they depend on, and those of an interrupted call
-    are kept. InputError if another process writes the same table, if batches wait that were made of something else, or
-    if a file that the sweep reads changes meanwhile.
+    Finished batches are stored in a folder next to the table; its name contains the digest of the sweep. An interrupted
+    call is resumed from them. ``threads`` and ``progress`` are those of :func:`run_sweep`. InputError if another
+    process writes the same table, if there are batches of different inputs, or if a file of the sweep changes during
+    the call.
     """
     path = Path(path)
     remove_remains(path)
@@ -248,7 +249,7 @@ def sweep_to_file(
     with held(folder, path):
         for other in path.parent.glob(f".{glob.escape(path.name)}.{16 * '[0-9a-f]'}"):
             if other != folder:
-                with suppress(OSError):  # it may hold batches, too
+                with suppress(OSError):  # this folder may contain batches, too
                     folder.rmdir()
                 expected = f"expected the sweep, scene and files that the batches in {other.name} were made of"
                 raise InputError("--out", path, f"{expected}, but some were changed; remove that folder to begin anew")
@@ -260,8 +261,9 @@ def sweep_to_file(
 
 
 def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
-    """One table from those of all batches, in the order of the runs; InputError for parts that are damaged, of another
-    sweep or of other sources, and for runs that are missing or there twice.
+    """Join the tables of all batches to one table, in the order of the runs, and write it.
+
+    InputError if a part is damaged, or of another sweep or other sources, or if runs are missing or occur twice.
     """
     tables: list[pd.DataFrame] = []
     owners: dict[int, str | PathLike[str]] = {}
@@ -279,7 +281,7 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
 
 
 def _lacking(sweep: Sweep, parts: list[set[int]]) -> str:
-    """Which ``--batch i/n`` are missing, if the parts are some of n equal ones, else which runs."""
+    """Return a text that names the missing ``--batch i/n`` if the parts are batches of n, else the missing runs."""
     size = max(map(len, parts), default=len(sweep.runs))
     for count in range(-(-len(sweep.runs) // size), len(sweep.runs) // max(size - 1, 1) + 1):
         batches = [set(sweep.rows(batch, count).index) for batch in range(count)]
@@ -298,7 +300,7 @@ def _whole(sweep: Sweep, part: Path) -> bool:
 
 
 def _seal(sweep: Sweep, text: str) -> str:
-    """Digest of what a part holds and of what it depends on."""
+    """Return the digest of a part's table and of the inputs of its sweep."""
     return hashlib.sha256(f"{sweep.digest()} {text}".encode()).hexdigest()
 
 
@@ -307,10 +309,10 @@ def _text(table: pd.DataFrame) -> str:
 
 
 def write_table(path: str | PathLike[str], table: pd.DataFrame, part_of: Sweep | None = None) -> None:
-    """Write a sweep's table: CSV, or HDF5 with a dataset and its unit per column where the name ends in ``.h5``.
+    """Write a sweep's table as CSV, or as HDF5 with a dataset and its unit per column if the name ends in ``.h5``.
 
-    The file appears under its name only when it is complete. A part ends with its seal, a comment or an attribute, if
-    the files that its runs were made of are still what they were.
+    The file appears under its name only when it is complete. The table of a batch (``part_of`` a sweep) also gets a
+    seal, a comment or an attribute. InputError if the sweep's files have changed.
     """
     path = Path(path)
     if path.suffix == ".h5":
@@ -339,8 +341,10 @@ def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
 
 
 def load_table(path: str | PathLike[str], part_of: Sweep | None = None) -> pd.DataFrame:
-    """Read a sweep's table, CSV or HDF5; InputError if there is none, it is of another kind, or its seal does not say
-    that it is a whole part of the sweep ``part_of``.
+    """Read a sweep's table, CSV or HDF5.
+
+    InputError if the file does not exist or is of another kind, or if its seal does not prove that it is a complete
+    batch of the sweep ``part_of``.
     """
     path = Path(path)
     try:
@@ -354,7 +358,7 @@ def load_table(path: str | PathLike[str], part_of: Sweep | None = None) -> pd.Da
         return pd.read_csv(io.StringIO(text))
     except InputError:
         raise
-    except Exception as error:  # a damaged file fails in as many ways as pandas has
+    except Exception as error:  # pandas raises many kinds of errors for a damaged file
         raise InputError(path, "", f"expected {_KIND}, got: {getattr(error, 'strerror', None) or error}") from None
 
 
@@ -365,7 +369,7 @@ def _check_seal(path: Path, part_of: Sweep | None, text: str, seal: str) -> None
 
 
 def _read_hdf5(path: Path) -> tuple[pd.DataFrame, str]:
-    """A table and its seal, empty where it has none."""
+    """Read a table and its seal; the seal is empty if there is none."""
     with checked_hdf5(path, _KIND) as file:
         if file.attrs.get("format") != "wrcore sweep":
             raise InputError(path, "attribute format", "expected 'wrcore sweep'")

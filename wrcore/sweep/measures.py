@@ -1,25 +1,26 @@
-"""What a sweep keeps of each run: one number per measure, over all wheelsets and wheels the worst one.
+"""Measures of a sweep: one number per measure and run, the worst value over all wheelsets and wheels.
 
 ============================  ========================================================================================
 ``y_rms_m``, ``y_max_m``      root mean square and largest lateral distance of a wheelset from the track's centre
-``amplitude_m``               half the peak-to-peak value of the lateral motion over the last ``window``: of a limit
-                              cycle, where the run has come to one
+``amplitude_m``               half the peak-to-peak value of the lateral motion over the last ``window``: the amplitude
+                              of a limit cycle, if the run has reached it
 ``yaw_max_rad``               largest yaw of a wheelset
-``frequency_Hz``              of the leading wheelset's lateral motion, as `hunting_frequency`; NaN without three swings
-``Q_min_N``, ``Q_max_N``      least and largest vertical force of a wheel
-``Y_max_N``                   largest lateral force of a wheel on its rail, by amount
-``Y_over_Q_max``              their largest quotient, by amount, where the wheel carries more than 1 kN
-``T_gamma_mean_N``            mean over the way of T gamma = |Fx xi + Fy eta|, summed over a wheel's patches;
-                              ``T_gamma_spin_mean_N`` with the spin's part, |Fx xi + Fy eta + Mz phi|
-``creep_power_mean_W``        mean power that a wheel's creep dissipates, -V (Fx xi + Fy eta + Mz phi)
+``frequency_Hz``              frequency of the leading wheelset's lateral motion, by `hunting_frequency`; NaN with fewer
+                              than three swings
+``Q_min_N``, ``Q_max_N``      smallest and largest vertical force of a wheel
+``Y_max_N``                   largest absolute lateral force of a wheel on its rail
+``Y_over_Q_max``              largest absolute quotient of both forces, where the wheel carries more than 1 kN
+``T_gamma_mean_N``            mean over distance of T gamma = |Fx xi + Fy eta|, summed over a wheel's patches;
+                              ``T_gamma_spin_mean_N`` includes spin, |Fx xi + Fy eta + Mz phi|
+``creep_power_mean_W``        mean power dissipated by a wheel's creep, -V (Fx xi + Fy eta + Mz phi)
 ``simulated_s``               time reached
 ``steps``, ``rejected``       accepted and rejected steps; likewise ``rhs_evaluations``, ``jacobians``,
                               ``factorisations``, ``table_out_of_range`` and ``smallest_step_s``
 ``wall_s``                    time spent in the integration (differs from run to run of the same sweep)
 ============================  ========================================================================================
 
-Measures of the motion are taken at the output times (``output.rate``) from ``begin`` on. Each run also has its
-``status`` and the integration ``method``. Those of forces evaluate all contacts again at the output times.
+Measures of the motion are evaluated at the output times (``output.rate``) from ``begin`` on. Each run also has its
+``status`` and the integration ``method``. Measures of forces evaluate all contacts again at the output times.
 """
 
 from __future__ import annotations
@@ -42,18 +43,18 @@ from wrcore.track.track import track_poses
 
 @dataclass(frozen=True)
 class Motions:
-    """Several runs at the same output times; NaN where a run did not come to."""
+    """Motions and forces of several runs at the same output times; NaN after the end of a run."""
 
     t: np.ndarray
-    """(n,), s."""
+    """Output times, shape (n,), s."""
     y: np.ndarray
-    """(runs, n, wheelsets), m."""
+    """Lateral positions, shape (runs, n, wheelsets), m."""
     yaw: np.ndarray
-    """(runs, n, wheelsets), rad."""
+    """Yaw, shape (runs, n, wheelsets), rad."""
     forces: np.ndarray | None
-    """(runs, n, wheelsets, 2, 6): of each wheel, as `wheel_forces` gives them; None where no measure needs them."""
+    """Results of `wheel_forces` for each wheel, shape (runs, n, wheelsets, 2, 6); None if no measure needs them."""
     window: float
-    """Length of the last part of a run, s."""
+    """Length of the last part of a run for `amplitude_m`, s."""
 
 
 def _worst(values: np.ndarray) -> np.ndarray:
@@ -94,7 +95,7 @@ MOTION: dict[str, Callable[[Motions], np.ndarray]] = {
     "yaw_max_rad": lambda m: _worst(np.abs(m.yaw)),
     "frequency_Hz": _frequency,
 }
-"""Measures of the motion, shape (runs,)."""
+"""Functions that return measures of the motion, shape (runs,)."""
 
 FORCES: dict[str, Callable[[Any], np.ndarray]] = {
     "Q_min_N": lambda m: -_worst(-m.forces[..., 0]),
@@ -105,20 +106,20 @@ FORCES: dict[str, Callable[[Any], np.ndarray]] = {
     "T_gamma_spin_mean_N": lambda m: _worst(_over_way(m, 3)),
     "creep_power_mean_W": lambda m: _worst(np.nanmean(m.forces[..., 4], axis=1)),
 }
-"""Measures of the wheels' forces, shape (runs,)."""
+"""Functions that return measures of the wheels' forces, shape (runs,)."""
 
 COUNTERS = (
     "simulated_s", "steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "table_out_of_range",
     "smallest_step_s", "wall_s",
 )  # fmt: skip
-"""Measures of the cost, of `wrcore.run.simulation.counters_of`."""
+"""Measures of the computational cost, from `wrcore.run.simulation.counters_of`."""
 
 MEASURES = (*MOTION, *FORCES, *COUNTERS)
 
 
 def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Lateral position (m) and yaw (rad) of the wheelsets in ``states`` (n, size), (n, wheelsets, 2), with their arc
-    lengths at the start (wheelsets,), m.
+    """Return lateral position (m) and yaw (rad) of the wheelsets, shape (n, wheelsets, 2), from ``states`` (n, size)
+    and their arc lengths at the start, ``starts`` (wheelsets,), m.
     """
     places = STATE_SIZE * model.bodies.wheelsets
     if model.track.tangent:
@@ -130,7 +131,8 @@ def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.
 
 
 def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:
-    """Q, Y, T gamma without and with spin (N), creep power (W) and speed (m/s) of wheels, (n, wheelsets, 2, 6)."""
+    """Return Q, Y, T gamma without and with spin (N), creep power (W) and speed (m/s) of wheels, shape
+    (n, wheelsets, 2, 6)."""
     patches, _, _ = evaluated(model, trajectory)
     angle, normal, lateral = (patches[..., k] for k in (reduction.ANGLE, reduction.NORMAL, reduction.FY))
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -1,4 +1,4 @@
-"""Sweeps from files: a scene, the keys to vary and how, become a table with a row per run."""
+"""Read and check sweeps: a scene and the keys to vary become a table with a row per run."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from wrcore.scene.pairs import find_file
 from wrcore.scene.stored import StoredScene
 from wrcore.sweep.measures import MEASURES
 
-MOST_RUNS = 10_000_000  # runs of a sweep
-MOST_BATCHES = 500  # a sweep with more batches than this would be many short processes
+MOST_RUNS = 10_000_000  # largest number of runs of a sweep
+MOST_BATCHES = 500  # largest number of batches: more would be many short processes
 
-FEW = 50  # values of a key that are all tried before any run
+FEW = 50  # largest number of values of a key that are all checked before any run
 
 OF_PARTS = ("name", "description", "vehicle", "wheel", "rail", "track", "contact.creep.table")
-"""Keys that decide what a scene is made of: a run that changes one of them needs the scene read anew."""
+"""Keys that determine the parts of a scene: if a run changes one of them, the scene is read again."""
 
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A checked sweep."""
+    """A checked sweep: its content, its scene and the table of its runs."""
 
     data: dict[str, Any]
     """Content of the sweep file with defaults."""
     source: str
-    """Named in errors."""
+    """Name of the sweep in error messages."""
     scene: Scene
-    """With the changes that hold for all runs."""
+    """Scene with the changes that apply to all runs."""
     runs: pd.DataFrame
     """A row per run, numbered from 0 (index ``run``), and a column per key."""
     files: dict[str, str]
@@ -58,12 +58,12 @@ class Sweep:
         return math.ceil(len(self.runs) / self.data["batch"])
 
     def rows(self, batch: int, count: int | None = None) -> pd.DataFrame:
-        """Runs of a batch, numbered from 0, of as many as the sweep has, or of another number of equal ones."""
+        """Return the rows of a batch, numbered from 0; ``count`` is the number of batches, by default `batches`."""
         edges = np.linspace(0, len(self.runs), (count or self.batches) + 1).round().astype(int)
         return self.runs.iloc[edges[batch] : edges[batch + 1]]
 
     def digest(self) -> str:
-        """Digest (16 hex digits) of all that the results depend on, but for the machine."""
+        """Return the digest (16 hex digits) of all inputs that determine the results, except the machine."""
         return digest_of_plan([self.data, self.scene.data], self.files)[:16]
 
     def __repr__(self) -> str:
@@ -72,7 +72,7 @@ class Sweep:
 
 
 def digest_of_plan(described: Any, files: Mapping[str, str]) -> str:
-    """Digest of a plan of many runs: what its files say, what was read for them, and the sources of the program."""
+    """Return the digest (64 hex digits) of a plan of many runs: its description, the files read and the sources."""
     read = sorted((Path(path).name, digest) for path, digest in files.items())
     text = json.dumps([described, read, __version__, source_digest()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -87,10 +87,10 @@ def load_sweep(
     Parameters
     ----------
     source : str, Path or dict
-        Sweep file (schema ``wrcore/scene/schemas/sweep.yaml``) or its content; then paths count from the working
+        Sweep file (schema ``wrcore/scene/schemas/sweep.yaml``) or its content; then paths are relative to the working
         directory.
     overrides : sequence of str, or dict
-        Further changes to the scene that hold for all runs, as :func:`wrcore.load_scene` takes them.
+        Further changes to the scene that apply to all runs, as for :func:`wrcore.load_scene`.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def load_sweep(
     Raises
     ------
     InputError
-        One line that names file, field and expectation. Every value that a key can take is checked.
+        One line that names the file, the field and the expected value. Every value of each key is checked.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def load_sweep(
 
 
 def _values(entry, sampling, field, source):
-    """Values of one key: a list, or bounds (from, to, scale) that a hypercube fills."""
+    """Return the values of one key as a list, or bounds (low, high, is_logarithmic) for a design of points."""
     if "values" in entry:
         if {"from", "to", "steps"} & set(entry):
             raise InputError(source, field, "expected either values or from and to")
@@ -157,7 +157,7 @@ def _values(entry, sampling, field, source):
 
 
 def _check_values(scene, entries, source):
-    """Try each key by itself, at the values that stand for all of it. Returns the digests of the files read."""
+    """Check each key separately, at values that represent all its values; return the digests of the files read."""
     files: dict[str, str] = {}
     for key, entry in entries.items():
         for value in _trials(entry):
@@ -172,8 +172,8 @@ def _check_values(scene, entries, source):
 
 
 def _check_rows(scene, runs, source):
-    """Try keys together, as some of the rows have them: the first of each combination of what are no numbers, and those
-    in which a number is least or largest."""
+    """Check keys together in some of the rows: the first row of each combination of values that are not numbers, and
+    the rows in which a number is smallest or largest."""
     numbers = [key for key, column in runs.items() if column.dtype.kind in "iuf"]
     others = runs.drop(columns=numbers)
     tried = others.map(repr).drop_duplicates().index[:FEW] if others.size else runs.index[:1]
@@ -191,13 +191,15 @@ def _check_rows(scene, runs, source):
 
 
 def _plain(value):
-    """A number of a table as a person writes it."""
+    """Convert a numpy number to a Python number, for messages."""
     return value.item() if isinstance(value, np.generic) else value
 
 
 def _trials(entry):
-    """Values of a key that stand for all: bounds and a number between them, or all of a list. Of many numbers those at
-    its ends, and one that is not whole."""
+    """Return values of a key that represent all of them: bounds and a number between them, or all values of a list.
+
+    Of a list with more than `FEW` numbers only the smallest, the largest and one fractional number are returned.
+    """
     if "values" not in entry:
         low, high = entry["from"], entry["to"]
         return low, high, low + 0.4142 * (high - low)
@@ -208,14 +210,15 @@ def _trials(entry):
 
 
 def _grid(values, sampling, source):
-    """Every combination."""
+    """Return all combinations of the values of the keys."""
     if (count := math.prod(map(len, values.values()))) > MOST_RUNS:
         raise InputError(source, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
     return list(itertools.product(*values.values()))
 
 
 def _list(values, sampling, source):
-    """The first values of all keys, the second ones, and so on."""
+    """Return one run per position in the lists of values: the first values of all keys, the second values, and so
+    on."""
     counts = {key: len(among) for key, among in values.items()}
     first = next(iter(counts))
     for key, count in counts.items():
@@ -226,7 +229,7 @@ def _list(values, sampling, source):
 
 
 def _design(values, sampling, source):
-    """Points of a design of scipy.stats.qmc: of a range between its bounds, of a list one of its values."""
+    """Return the values of each key at the points of a Latin hypercube or a Sobol sequence (scipy.stats.qmc)."""
     from scipy.stats import qmc
 
     if "runs" not in sampling:
@@ -242,7 +245,7 @@ def _design(values, sampling, source):
 
 
 def _at_places(among, places):
-    """Values at places (n,) from 0 to 1 in a list or between bounds."""
+    """Return the values at relative positions (n,) from 0 to 1 in a list or between bounds."""
     if isinstance(among, list):
         return [among[min(int(place * len(among)), len(among) - 1)] for place in places]
     low, high, log = among
@@ -250,9 +253,9 @@ def _at_places(among, places):
 
 
 RUNS = {"grid": _grid, "list": _list, "latin_hypercube": _design, "sobol": _design}
-"""Runs by ``sampling.kind``."""
+"""Functions that return the runs, by ``sampling.kind``."""
 
 
 def of_parts(key: str) -> bool:
-    """Whether a scene has to be read anew if this key changes."""
+    """Whether a scene has to be read again if this key changes."""
     return any(key == part or key.startswith(f"{part}.") for part in OF_PARTS)

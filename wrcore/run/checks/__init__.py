@@ -1,1 +1,1 @@
-"""Whether a run stayed where its models and inputs are valid."""
+"""Checks whether a run stayed in the range in which its models and inputs are valid."""

@@ -1,4 +1,4 @@
-"""Which inputs of a scene lie outside the path, or the time, of a run."""
+"""Find inputs of a scene that lie outside the distance or the time of a run."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from wrcore.kernels.told import warn_once
 from wrcore.scene.description import Scene
 
 SLACK, SLACK_M = 0.01, 1.0
-"""Part of the way, and length (m), by which a run may go beyond speed times duration: its wheels slip and sway."""
+"""Margins, relative and in m, by which the distance of a run may exceed speed times duration: wheels slip and sway."""
 
 FAR_M = 1000.0
-"""Irregularity in a file that begins farther ahead of a session's vehicle than this counts from elsewhere, m."""
+"""Distance ahead of a session's vehicle, m, beyond which the beginning of an irregularity file causes a warning: its
+chainage probably has another origin."""
 
 POINTS = "track.irregularity.points"
 
 
 class Extent(NamedTuple):
-    """Where an input of a scene has an effect."""
+    """Range of arc length or time in which an input of a scene has an effect."""
 
     field: str
     begin: float
-    """Arc length in m, or time in s."""
+    """Begin of the range: arc length in m, or time in s."""
     end: float
     what: str
-    """The input, for a message."""
+    """Name of the input in messages."""
     unit: str = "m"
 
 
 def extents(scene: Scene) -> Iterator[Extent]:
-    """Extents of a scene's inputs over arc length or time; -inf and inf where an input has no end."""
+    """Yield the extents of a scene's inputs over arc length or time; -inf and inf if an input has no end."""
     data = scene.data
     yield from _irregularities(scene)
     yield from _path(data["track"])
@@ -71,13 +72,14 @@ def _irregularities(scene: Scene) -> Iterator[Extent]:
     whats = [f"irregularity in {name}" for name in names] + ["an irregularity"]
     for field, what, ends in zip(fields, whats, irregularity_extents(scene.track.irregularity), strict=False):
         yield Extent(field, float(ends[0]), float(ends[1]), what)
-    if "own" in spec:  # whose law is not called before the scene is compiled
+    if "own" in spec:  # a user's irregularity: its law is not called before the scene is compiled
         begin = spec["own"]["begin"]
         yield Extent("track.irregularity.own.begin", begin, begin + spec["own"]["length"], "an irregularity")
 
 
 def _path(track: dict[str, Any]) -> Iterator[Extent]:
-    """Segments of the path and gradients, each with all that follows: what comes last goes on without end."""
+    """Yield extents of curves, transitions and gradients, each from its beginning to infinity: the last segment has no
+    end."""
     begin = 0.0
     for k, segment in enumerate(track["path"] if isinstance(track["path"], list) else ()):
         kind = next(key for key in ("tangent", "transition", "curve") if key in segment)
@@ -92,18 +94,18 @@ def _path(track: dict[str, Any]) -> Iterator[Extent]:
 
 
 def _table(spec: Any, field: str, what: str) -> Iterator[Extent]:
-    """A table over arc length or time, constant beyond its ends: it has an effect where its values change."""
+    """Yield the extent of a table over arc length or time, between its ends; beyond them its values are constant."""
     for key, unit in (("arc_length", "m"), ("time", "s")):
         if isinstance(spec, dict) and key in spec:
             yield Extent(f"{field}.{key}", float(spec[key][0]), float(spec[key][-1]), what, unit)
 
 
 def check_reach(scene: Scene, duration: float = math.inf) -> None:
-    """Refuse inputs that a run from the scene's initial state cannot reach, and warn of those beyond its end.
+    """Refuse inputs that a run from the scene's initial state cannot reach, and warn of inputs beyond its end.
 
-    Refused are inputs behind the last wheelset or before time 0, and files of irregularity that begin beyond the end:
-    their chainage is another one. ``duration`` in s; where it is infinite, as of sessions, nothing lies beyond the end.
-    The end of a run with a drive or gradients is not known before it (`warn_of_unreached`).
+    Inputs behind the last wheelset or before time 0 are refused. Irregularity files that begin beyond the end are
+    refused, too: their chainage has another origin. ``duration`` is in s; if it is infinite, as in sessions, no input
+    lies beyond the end. With a drive or gradients the end is not known beforehand (`warn_of_unreached`).
     """
     way = duration * scene.data["speed"]
     behind, ahead = _places(scene)
@@ -124,14 +126,16 @@ def check_reach(scene: Scene, duration: float = math.inf) -> None:
 
 
 def warn_of_unreached(scene: Scene, arc_lengths: np.ndarray) -> None:
-    """Warn of inputs ahead of the arc lengths (n,), m, that wheelsets have reached, where speed and duration do not say
-    beforehand how far a run goes."""
+    """Warn of inputs ahead of the arc lengths (n,), m, that wheelsets have reached at the end of a run.
+
+    This is for runs with a drive or gradients, whose distance is not known beforehand.
+    """
     if _is_free(scene) and len(arc_lengths):
         _warn_ahead(scene, {"m": float(np.max(arc_lengths))})
 
 
 def _places(scene: Scene) -> tuple[float, float]:
-    """Arc lengths of the last and the first wheelset at the beginning, m; infinite without wheelsets."""
+    """Return the initial arc lengths of the last and the first wheelset, m; both infinite without wheelsets."""
     vehicle, moved = scene.vehicle, scene.data["initial"]["bodies"]
     nominal = zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True)
     places = [float(moved.get(name, {}).get("x", x)) for name, x in nominal]
@@ -144,7 +148,8 @@ def _is_free(scene: Scene) -> bool:
 
 
 def _warn_ahead(scene: Scene, ends: dict[str, float]) -> None:
-    """Warn of inputs that begin beyond the end of a run, by unit; of a path's segments, and gradients, of the first."""
+    """Warn of inputs that begin beyond the end of a run, ``ends`` by unit; of path segments and gradients only of the
+    first."""
     said = set()
     for one in extents(scene):
         group = one.field.rpartition(".")[0] if one.end < math.inf else one.field.split(".")[1]

@@ -1,10 +1,10 @@
-"""Patches of a run whose surfaces along the rail are no parabola: flats, bumps, joints, noses of crossings.
+"""Count contact patches of a run whose gap along the rail is not a parabola: flats, bumps, joints, crossing noses.
 
-Runs know the gap along the rail by one parabola per place across. Where the real gap leaves it within a patch by more
-than `ROUGH` of the penetration, the maximum pressure of that patch may be too low; single positions of a wheelset are
-solved on a grid there (`wrcore.analysis.contact.on_slices`). Runs count such patches at their output times, from the
-section of the real surfaces along the middle of each patch. They are compared with the parabola that the run's tables
-hold: of a wheelset in the middle without yaw, a yaw moves it along the rail.
+Runs approximate the gap along the rail by one parabola per lateral coordinate. If the real gap within a patch differs
+from it by more than `ROUGH` times the penetration, the maximum pressure of that patch may be too low. For single
+positions of a wheelset such patches are solved on a grid (`wrcore.analysis.contact.on_slices`). Runs count them at
+their output times, from the section of the real surfaces along the middle of each patch. It is compared with the
+parabola in the run's tables, which is that of a centred wheelset without yaw; yaw shifts the parabola along the rail.
 """
 
 import math
@@ -20,30 +20,32 @@ from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
 
 ROUGH = 0.05
-"""Share of its largest penetration by which a patch's gap may leave, on a strip and within its length, the parabola
-that strips know. A wave h cos(pi x/a) on a length 2a is flattened by a pressure pi E* h/(2a), Hertz's largest is
-2 E* d/(pi a): this share moves it by pi^2/4 of itself, 12 %, half a wave on that length by half as much."""
+"""Largest difference between the gap on a strip of a patch and the parabola of the strips, relative to the patch's
+largest penetration d. A wave h cos(pi x/a) on a length 2a is flattened by a pressure pi E* h/(2a). Hertz's maximum is
+2 E* d/(pi a). Thus h = 0.05 d changes the maximum pressure by pi^2/4 times 0.05, 12 %; half a wave on that length
+changes it by half as much."""
 
 NAME = "not_parabolic"
-"""Counter of such patches; with a wheelset and a side behind it, of output times at which that wheel has one."""
+"""Counter of such patches. Followed by a wheelset and a side, it counts output times at which that wheel has one."""
 
 STATIONS = 41
-"""Over the length of a patch, where its gap is compared."""
+"""Number of points over the length of a patch at which its gap is compared."""
 
 ACROSS = 5e-4
-"""Distance of lateral coordinates at which slices are taken, m."""
+"""Distance between lateral coordinates at which slices are evaluated, m."""
 
 LEAST_STEP, LARGEST_STEP, PER_SLICE = 1e-3, 1e-2, 10
-"""Distance of sections of a rail, m, and their number between two slices of a rail whose heads go through."""
+"""Smallest and largest distance between sections of a rail, m, and their number between two slices of a rail with a
+continuous head."""
 
 LENGTH = 2.0
-"""Length of rail whose sections are taken at a time, m."""
+"""Length of rail whose sections are evaluated at a time, m."""
 
-_AT_A_TIME = 2000  # patches, for memory: 3 MB an array
+_AT_A_TIME = 2000  # number of patches evaluated at a time, to save memory: 3 MB an array
 
 
 class ShapesAlong:
-    """Surfaces along the rail of the wheels of a scene whose rails or wheels change, side by side as in its tables."""
+    """Real surfaces along the rail of a scene's wheels, for wheels out of round and rails that vary along the track."""
 
     def __init__(self, scene):
         self._scene, self._grids, self._flat = scene, {}, {}
@@ -54,8 +56,8 @@ class ShapesAlong:
 
     @cached_property
     def _changing(self):
-        """By the number of each wheel that has any, arc lengths (m) between which heights below it change, and the
-        function that returns them."""
+        """Varying surfaces by the number of the wheel: a list of first and last arc length (m) and the function that
+        returns the heights between them."""
         scene, found = self._scene, {}
         for number in range(len(self._pairs)):
             side = number % 2
@@ -72,8 +74,11 @@ class ShapesAlong:
         return found
 
     def counts(self, patches, s, yaw):
-        """Counters of ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), NaN where there is none, of wheelsets at arc
-        lengths ``s`` (m) with a ``yaw`` (rad), (n, k): `NAME`, and that of each wheel that has any."""
+        """Return counters of patches that are not parabolic: `NAME`, and one of each wheel that has such patches.
+
+        ``patches`` have shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), NaN where absent; ``s``, arc lengths of the
+        wheelsets (m), and ``yaw`` (rad) have shape (n, k).
+        """
         counts = {NAME: 0}
         for number in self._changing:
             k, side = divmod(number, 2)
@@ -84,7 +89,7 @@ class ShapesAlong:
         return counts
 
     def rough(self, number, patches, s, yaw):
-        """Whether patches (n, MAX_PATCHES, PATCH_COLUMNS) of a wheel, by number, are rough: bool (n, MAX_PATCHES)."""
+        """Whether patches (n, MAX_PATCHES, PATCH_COLUMNS) of a wheel exceed `ROUGH`, bool (n, MAX_PATCHES)."""
         found = np.zeros(patches.shape[:2], bool)
         present = np.isfinite(patches[..., reduction.NORMAL])
         for low, high, heights in self._changing.get(number, ()):
@@ -96,13 +101,14 @@ class ShapesAlong:
         return found
 
     def _misfits(self, number, rows, s, yaw, heights):
-        """By how much the gap leaves the parabola within patches (m, PATCH_COLUMNS), over their penetrations, (m,)."""
+        """Return the largest difference (m,) of gap and parabola within patches (m, PATCH_COLUMNS), relative to their
+        penetration."""
         pair, sign = self._flat_pair(number), (1.0, -1.0)[number % 2]
         u = rows[:, reduction.U_WHEEL] + pair.half_distance - pair.rail_distance
         curvature, lead = pair.strips(u)
-        below = -sign * np.sin(yaw) * (pair.half_distance + lead)  # where the round wheel would touch a level rail
+        below = -sign * np.sin(yaw) * (pair.half_distance + lead)  # contact point of a round wheel on a level rail
 
-        def height(x):  # (n, m): of the surfaces above those of a round wheel on a level rail
+        def height(x):  # (n, m): height of the surfaces above those of a round wheel on a level rail
             return heights(s, below, x, rows[:, reduction.U_RAIL], rows[:, reduction.U_WHEEL], 1.0 / curvature)
 
         seen = pair.turned(np.zeros(1), u, lambda _, x, __: height(np.repeat(x[:, None], u.size, axis=1)))[0]
@@ -110,11 +116,11 @@ class ShapesAlong:
         x = middle + half * np.linspace(-1.0, 1.0, STATIONS)[:, None]
         fitted = seen[HEIGHT] - (seen[BEND] + 0.5 * curvature) * (x - seen[AHEAD]) ** 2
         real = height(x) - (1.0 - np.sqrt(1.0 - (curvature * x) ** 2)) / curvature
-        off = np.nan_to_num(np.abs(fitted - real), nan=np.inf).max(axis=0)  # NaN: no rail, on part of the patch
+        off = np.nan_to_num(np.abs(fitted - real), nan=np.inf).max(axis=0)  # NaN: no rail under part of the patch
         return off / np.maximum(rows[:, reduction.PENETRATION], 1e-9)
 
     def _flat_pair(self, number):
-        """`WheelOnSlices` of a wheel, round, on the plain rail."""
+        """Return the `WheelOnSlices` of a wheel, by number, as a round wheel on the unchanged rail."""
         pair = self._pairs[number]
         if id(pair) not in self._flat:
             sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance
@@ -122,7 +128,7 @@ class ShapesAlong:
         return self._flat[id(pair)]
 
     def _of_wheel(self, number, shape, angle, s, below, x, u_rail, u_wheel, radii):
-        """How much further down a wheel out of round reaches, from the round wheel with which a run begins."""
+        """Return how far the surface of a wheel out of round lies below that of the round wheel at the begin, m."""
         both = self._pairs[number - number % 2 : number - number % 2 + 2]
         radius, start = 0.5 * sum(pair.rolling_radius for pair in both), self._starts[number // 2]
         turned, share = angle + (s - start) / radius, _eased(np.abs(s - start) / (math.pi * radius))
@@ -141,7 +147,8 @@ class ShapesAlong:
 
 
 def _grid_of(shape, wheel):
-    """First wheel coordinate (m) and heights of a wheel of slices at angles `STEP` and coordinates `ACROSS` apart."""
+    """Return the first wheel coordinate (m), and heights of a wheel of slices on a grid with distances `STEP` in angle
+    and `ACROSS` in wheel coordinate."""
     strips = np.arange(math.ceil(wheel.u[0] / ACROSS), wheel.u[-1] / ACROSS) * ACROSS
     first, last = shape.within(strips)
     angles = STEP * np.arange(math.ceil(TURN / STEP) + 1)
@@ -149,7 +156,7 @@ def _grid_of(shape, wheel):
 
 
 def _between(values, i, j):
-    """Values (n, m) at broken indices, as at its ends beyond these, by bilinear interpolation."""
+    """Interpolate values (n, m) bilinearly at fractional indices ``i`` and ``j``; constant beyond the ends."""
     (n, m), shape = values.shape, np.shape(i)
     i, j = np.clip(i, 0.0, n - 1.0), np.clip(j, 0.0, m - 1.0)
     low, left = np.minimum(i.astype(int), n - 2), np.minimum(j.astype(int), m - 2)
@@ -160,20 +167,20 @@ def _between(values, i, j):
 
 
 def _eased(part):
-    """Smooth step from 0 to 1, by which runs go over into what changes."""
+    """Return a smooth step from 0 to 1, with which runs fade in varying surfaces."""
     part = np.clip(part, 0.0, 1.0)
     return part * part * (3.0 - 2.0 * part)
 
 
 def _of_wave(wave, s, below, x, u_rail, u_wheel, radii):
-    """How much higher a corrugated rail is."""
+    """Return the height of a corrugated rail above the smooth rail, m."""
     share = _eased(np.minimum(s - wave.begin, wave.begin + wave.length - s) / wave.fade)
     place = s + below + x - wave.begin
     return share * wave.reach(np.zeros(1), 0.0, place.ravel()).reshape(place.shape)
 
 
 def _of_rail(rail, crossing, s, below, x, u_rail, u_wheel, radii):
-    """Heights of a rail of slices, in parts of it so long that its sections fit into memory."""
+    """Return heights of a rail of slices, m, computed in parts of `LENGTH` to save memory."""
     place = s + below + x - crossing.at
     place = -place if crossing.backwards else place
     step = LEAST_STEP
@@ -192,8 +199,10 @@ def _of_rail(rail, crossing, s, below, x, u_rail, u_wheel, radii):
 
 
 def warn_of_shapes(source, counters, rate):
-    """Warn of patches that are no parabola along the rail: on which wheels, and at how many output times, which are at
-    a ``rate`` (1/s)."""
+    """Warn of patches whose gap along the rail is not a parabola: name the wheels and the number of their output times.
+
+    ``rate`` is the number of output times per second, 1/s.
+    """
     if not counters.get(NAME):
         return
     wheels = {name.removeprefix(f"{NAME}_"): n for name, n in counters.items() if name.startswith(f"{NAME}_")}

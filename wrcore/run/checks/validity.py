@@ -1,11 +1,12 @@
-"""Where contacts leave the range that their models are made for: flags of patches and wheelsets in given poses, which a
-run counts at its output times, not while it is integrated.
+"""Flags of contact patches and wheelsets outside the range of validity of the contact models.
+
+A run counts them at its output times, not during integration.
 
 =====================  ================================================================================================
 `half_space`           patches whose semi-axis across exceeds `WIDEST` of the smaller lateral radius of curvature there
 `conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
 `profile_edge`         patches that reach beyond the end of a profile
-`search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
+`search_fallback`      wheels whose roll or yaw is so large that the search evaluated every strip
 `not_parabolic`        patches whose gap along the rail is no parabola (`wrcore.run.checks.shape_along`)
 `before_irregularity`  output times at which no wheelset has reached the first sample of the track's irregularity
 `beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
@@ -13,18 +14,19 @@ run counts at its output times, not while it is integrated.
 `both_flanges`         wheelsets that touch with the flanges of both wheels: too wide for the gauge
 =====================  ================================================================================================
 
-A patch of an output time counts once; counters of what happens between outputs (creep look-ups out of the table's
-range, collapses of the step size) come from the integration itself.
+A patch at an output time is counted once. Events between outputs (creepages outside the lookup table, collapses of the
+step size) are counted during integration.
 
-*Half-space.* Hertz's theory takes both bodies for half-spaces and their surfaces for paraboloids: the patch must be
-small against the radii of curvature (Johnson, Contact Mechanics (1985), section 4.1). The number is ours: at b = R/3
-the parabola is off a circle's height by (b/R)^2/4 = 2.8 % at the edge of the patch, and the surface there is inclined
-by 19 degrees. *Conformal.* The pressure acts along the surface's own normal; where this turns by 0.35 rad (20 degrees)
-over the patch, the pressure at its edges points 10 degrees past the patch's one normal, and 17 % of it lie in the
-tangent plane. Curvatures are those that Hertz is given, averaged over the profile's window. *Hollow ahead.* A strip
-touches where its normal has no component along the rail. That is its deepest point as long as the wheel's normal
-curvature along the rail, cos^2(chi)/(R sqrt(1 + R'^2)) + kappa sin^2(chi) with sin(chi) = sin(yaw) sqrt(1 + R'^2), is
-positive: in the flange root of S1002 up to 33 mrad of yaw where it is steepest. Beyond, no patch is meant by it.
+*Half-space.* Hertz's theory approximates both bodies by half-spaces and their surfaces by paraboloids. The patch must
+be small compared with the radii of curvature (Johnson, Contact Mechanics (1985), section 4.1). The limit is our choice:
+at b = R/3 the height of the parabola has an error of (b/R)^2/4 = 2.8 % relative to a circle at the edge of the patch,
+where the surface is inclined by 19 degrees. *Conformal.* The pressure acts along the local normal of the surface. If
+the normal turns by 0.35 rad (20 degrees) over the patch, the pressure at its edges deviates by 10 degrees from the
+patch's single normal, and 17 % of it lie in the tangent plane. Curvatures are those used in Hertz's theory, averaged
+over the profile's window. *Hollow ahead.* A strip touches at the point at which its normal has no component along the
+rail. This is the deepest point as long as the wheel's normal curvature along the rail,
+cos^2(chi)/(R sqrt(1 + R'^2)) + kappa sin^2(chi) with sin(chi) = sin(yaw) sqrt(1 + R'^2), is positive: at the steepest
+point of the flange root of S1002 up to 33 mrad of yaw. At larger yaw this point is not a contact point.
 """
 
 import numpy as np
@@ -59,7 +61,7 @@ LIMITS = {
     "before_irregularity": "output times before the beginning of the irregularity",
     "beyond_irregularity": "wheelsets past the end of the irregularity",
 }
-"""Counters of a run, as a person reads them."""
+"""Names of a run's counters in messages and summaries."""
 
 MEANINGS = {
     "patches": "patches that were looked at",
@@ -96,7 +98,7 @@ MEANINGS = {
     "wheel; the last try is taken",
     "wall_s": "time of the integration on the clock, s",
 }
-"""What each counter of a run counts or measures; ``python -m study.report.counters`` writes it into how_runs_end.md."""
+"""Meaning of each counter of a run; ``python -m study.report.counters`` writes this table into how_runs_end.md."""
 
 FLAGS = {
     "half_space": "1 where the patch is too wide for a half-space, else 0",
@@ -106,19 +108,21 @@ FLAGS = {
     "hollow_ahead": "1 where the wheel is yawed too far for its hollow, else 0",
     "both_flanges": "1 where both flanges of the wheelset touch: too wide for the gauge, else 0",
 }
-"""Flags of patches in static answers by the names of a run's counters: what they mean."""
+"""Meaning of each flag of patches in static results, by the name of the run's counter."""
 
 LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error", "look_up_pressure_error"
-"""Counters of a run that looks exact contact up: how far its cells are from the exact solver, see
-:func:`look_up_errors`."""
+"""Counters of a run with a lookup table of exact contact: interpolation errors of its cells relative to the exact
+solver, see :func:`look_up_errors`."""
 
-_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # those that look at the profiles
+_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # flags that depend on the profiles
 
 
 def exceeded(contact, patches, roll, yaw):
-    """Counts by name of limits that ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), of
-    :func:`wrcore.equations.outputs.evaluations_at` (NaN: none), and ``roll``, ``yaw`` (n, k), rad, of the wheelsets
-    relative to the track exceed, and of ``patches`` that were looked at.
+    """Count patches and wheelsets that exceed each limit, by the names of `FLAGS`, and all ``patches``.
+
+    ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), NaN where absent, are results of
+    :func:`wrcore.equations.outputs.evaluations_at`. ``roll`` and ``yaw`` (n, k), rad, are those of the wheelsets
+    relative to the track.
     """
     counts = {name: int(np.sum(found)) for name, found in flags(contact, patches, roll, yaw).items()}
     counts["search_fallback"] *= 2  # both wheels of a wheelset
@@ -126,10 +130,12 @@ def exceeded(contact, patches, roll, yaw):
 
 
 def flags(contact, patches, roll, yaw):
-    """Limits that are exceeded, by the names of `FLAGS`, from arguments as for `exceeded`: of patches (n, k, 2,
-    MAX_PATCHES), and search_fallback and both_flanges of wheelsets (n, k); bool."""
+    """Return which limits are exceeded, bool, by the names of `FLAGS`; arguments as for `exceeded`.
+
+    Flags of patches have shape (n, k, 2, MAX_PATCHES); search_fallback and both_flanges of wheelsets have (n, k).
+    """
     flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
-    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * _tilt(contact, yaw) ** 2  # as the search
+    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * _tilt(contact, yaw) ** 2  # as in search
     found = {name: np.zeros(patches.shape[:-1], bool) for name in _OF_PROFILES}
     for k in range(patches.shape[1]) if contact.geometries else (slice(None),):
         for wheel in range(2) if contact.geometries else (slice(None),):
@@ -145,8 +151,8 @@ def _tilt(contact, yaw):
 
 
 def _of_profiles(geometry, patches, tilt):
-    """Flags, by the names of `_OF_PROFILES` and of the shape (...) of ``tilt``, of patches (..., PATCH_COLUMNS) of
-    wheels of one geometry."""
+    """Return flags, bool (...), by the names of `_OF_PROFILES`, of patches (..., PATCH_COLUMNS) of wheels with one
+    geometry; ``tilt`` (...) is the tangent of the yaw."""
     present = np.isfinite(patches[..., reduction.NORMAL])
     rows, out = patches[present], {}
     width = rows[:, reduction.SEMI_B]
@@ -170,10 +176,13 @@ def _of_profiles(geometry, patches, tilt):
 
 
 def look_up_errors(contact, patches):
-    """`LOOK_UP_ERRORS` of ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up in the tables of a
-    contact model: the largest errors in the middles of their cells, of a wheel's normal force, over it, of its creep
-    force, over what friction bears (what its modes leave included), and of the largest pressure, over it; nothing where
-    patches are not looked up."""
+    """Return the `LOOK_UP_ERRORS` of ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) from the tables of a contact
+    model; empty without tables.
+
+    They are the largest errors at the centres of the table cells that were used. The error of a wheel's normal force is
+    relative to this force, that of its creep force (with the error of its modes) relative to friction times normal
+    force, that of the maximum pressure relative to this pressure.
+    """
     if not contact.strips.looked_up:
         return {}
     if not len(patches):
@@ -188,9 +197,9 @@ def look_up_errors(contact, patches):
 
 
 def _profile(nodes, start, step, u):
-    """Of a profile at u: curvature (1/m, positive where wheel or rail bulge), distance to its end (m), value and slope.
+    """Return curvature (1/m, positive where convex), distance to the nearer end (m), value and slope of a profile at u.
 
-    Both the wheel's radius and the rail's height grow out of the body.
+    The wheel's radius and the rail's height are both positive outwards from the body.
     """
     places = start + step * np.arange(len(nodes))
     value, slope, second = (np.interp(u, places, nodes[:, column]) for column in (VALUE, SLOPE, CURVATURE))

@@ -1,1 +1,1 @@
-"""What is left of a run: channels, their units and meaning, files."""
+"""Results of a run: channels with their units and descriptions, and run files."""

@@ -1,8 +1,8 @@
-"""What the channels of a run are: unit by the end of the name, and meaning.
+"""Units and descriptions of the channels of a run; the end of a channel's name states its unit.
 
-A body's channels are in the axes of the track at its centre of mass: t ahead, n left in the canted plane, b up, at the
-arc length x. Its angles are relative to them; its velocity, angular velocity and acceleration are those in inertial
-space, resolved along them.
+A body's channels are in the axes of the track at its centre of mass, at the arc length x: t ahead, n left in the canted
+plane, b up. Its angles are relative to these axes. Its velocity, angular velocity and acceleration are relative to
+inertial space and have components along these axes.
 """
 
 UNIT_SUFFIXES = {
@@ -119,7 +119,7 @@ DESCRIPTIONS = {
 
 
 def unit_of(channel: str) -> str:
-    """Unit that a channel's name states, ``1`` for a pure number.
+    """Return the unit that a channel's name states, ``1`` for a pure number.
 
     Examples
     --------

@@ -1,7 +1,8 @@
-"""Channels as datasets of a run file: each with its unit and description, over one dimension scale of times.
+"""Write channels as datasets of a run file: each with unit and description, over one dimension scale of times.
 
-HDF5's own calls make them. ``attach_scale`` of h5py writes the scale's list of datasets anew for each of them, and h5py
-makes each attribute under another name first: together more than half of the time in which a run is written.
+This uses the low-level interface of HDF5. ``attach_scale`` of h5py rewrites the scale's list of datasets for each of
+them, and h5py first creates each attribute under another name. Both together take more than half of the time of writing
+a run.
 """
 
 import h5py
@@ -11,13 +12,14 @@ from h5py import h5a, h5d, h5p, h5r, h5s, h5t
 from wrcore.run.output.channels import DESCRIPTIONS, unit_of
 
 ROWS = 8192
-"""Rows of a chunk at most."""
+"""Largest number of rows of a chunk."""
 
 LEVEL = 3
-"""Level of deflate: 4 takes a sixth more time for 0.5 % less; 1 is no faster."""
+"""Level of deflate compression: level 4 takes a sixth more time for files 0.5 % smaller; level 1 is not faster."""
 
 LONGEST_LIST = 4000
-"""Datasets in the scale's list at most: an attribute holds 64 KiB. Readers find the scale by ``DIMENSION_LIST``."""
+"""Largest number of datasets in the scale's list: an attribute holds 64 KiB. Readers find the scale by
+``DIMENSION_LIST``."""
 
 _TEXT, _SCALAR = h5t.py_create(h5py.string_dtype(), logical=True), h5s.create(h5s.SCALAR)
 _ENTRY = np.dtype({
@@ -26,8 +28,8 @@ _ENTRY = np.dtype({
 
 
 class Datasets:
-    """Datasets of a file over its times ``t``, of which there are ``count``, compressed in chunks of some ``rows``;
-    call `finish` when all are created."""
+    """Datasets of a file over its ``count`` times ``t``, compressed in chunks of at most ``rows`` rows; call `finish`
+    when all are created."""
 
     def __init__(self, file: h5py.File, count: int, compressed: bool = True, rows: int = ROWS) -> None:
         self._file, self._count, self._rows, self._compressed = file, count, min(count, rows, ROWS), compressed
@@ -36,7 +38,7 @@ class Datasets:
         self._scale = np.array([h5r.create(file.id, b"t", h5r.OBJECT)], h5py.ref_dtype)
 
     def create(self, group: str, name: str, shape: tuple[int, ...] = ()) -> h5py.Dataset:
-        """Create the dataset of a channel, whose values have a shape each, in a group."""
+        """Create the dataset of a channel in a group; ``shape`` is the shape of its value at one time."""
         if group not in self._groups:
             self._groups[group] = self._file.require_group(group).id
         dataset = self._create(self._groups[group], name, (self._count, *shape))
@@ -48,7 +50,7 @@ class Datasets:
         return h5py.Dataset(dataset)
 
     def finish(self) -> None:
-        """Write the scale's list of the datasets."""
+        """Write the list of datasets that belong to the dimension scale."""
         if 0 < len(self._entries) <= LONGEST_LIST:
             self._file["t"].attrs.create("REFERENCE_LIST", np.array(self._entries, _ENTRY), dtype=_ENTRY)
 
@@ -60,7 +62,8 @@ class Datasets:
         return dataset
 
     def _properties(self, shape):
-        """Chunks of one column, as that of a patch which is absent holds NaN alone."""
+        """Return creation properties of datasets: chunks have one column, because columns of absent patches hold only
+        NaN, which compresses well."""
         properties = h5p.create(h5p.DATASET_CREATE)
         properties.set_obj_track_times(False)
         if self._compressed and self._count:

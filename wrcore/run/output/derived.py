@@ -1,20 +1,21 @@
-"""Channels that follow from those of contacts: forces on the rails, wear, pressure and rolling radius of wheels, sum of
-Y and conicity of wheelsets.
+"""Channels derived from those of contacts: forces on the rails, wear, pressure and rolling radius of wheels, sum of Y
+and conicity of wheelsets.
 
-Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: its lateral force on the rail in the plane
-of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Sum of
-Y: lateral force of a wheelset on the track, to the left. Wear number T gamma: |Fx xi + Fy eta| summed over the patches
-(N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed
-over the patches (W). Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b). Rolling radius: distance of a
-wheel's contact points from the axle, by their normal forces where there are several. Its difference, left less right,
-is positive where it steers a wheelset back that is off to the left (EN 15302). Effective conicity: this difference over
-twice the wheelset's displacement from the middle of both contacts' rails (Wickens, Fundamentals of Rail Vehicle
-Dynamics (2003)); of a cone its slope, to first order.
+Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: lateral force of a wheel on its rail in
+the plane of the track, positive to the field side (a flange pushes with positive Y). Y/Q: quotient of both for each
+wheel. Sum of Y: lateral force of a wheelset on the track, to the left. Wear number T gamma: |Fx xi + Fy eta| summed
+over the patches (N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: power dissipated by friction,
+-V (Fx xi + Fy eta + Mz phi) summed over the patches (W). Maximum pressure: of each patch; in ellipses 3 N/(2 pi a b).
+Rolling radius: distance of a wheel's contact points from the axle, averaged with their normal forces as weights.
+Rolling radius difference: left minus right, positive if it steers a wheelset displaced to the left back to the centre
+(EN 15302). Effective conicity: this difference over twice the wheelset's displacement from the middle of both rails in
+contact (Wickens, Fundamentals of Rail Vehicle Dynamics (2003)). For a cone it is the slope, to first order.
 
-The work of a patch per metre run, -(Fx xi + Fy eta + Mz phi), is what friction turns into heat and wear, never negative
-(Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 1.3). T gamma is its amount without the
-spin's part, as wear models take it (Pearce and Sherratt, Wear 144 (1991) 343-351), or with it. The products carry
-signs: where spin drives the lateral force along its creepage (on a flange, mostly), one of them gives work back.
+The work of a patch per metre run, -(Fx xi + Fy eta + Mz phi), is dissipated as heat and wear and never negative
+(Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 1.3). T gamma is its absolute value without
+the part of spin, the common form in wear models (Pearce and Sherratt, Wear 144 (1991) 343-351), or with it. The
+products have signs: if spin drives the lateral force along its creepage (mostly on a flange), one of them is negative
+work.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ import numpy as np
 
 from wrcore.geometry.track import SIDES
 
-UNLOADED = 1e3  # below this Q counts as no contact and Y/Q is left out, N
-CENTRED = 1e-4  # nearer to the middle of its rails a wheelset has no conicity, m
+UNLOADED = 1e3  # Q below which a wheel is unloaded and Y/Q is NaN, N
+CENTRED = 1e-4  # displacement from the middle of the rails below which conicity is NaN, m
 
 OF_WHEELS = {
     "Q": "Q_N", "Y": "Y_N", "Y_over_Q": "Y_over_Q", "T_gamma": "T_gamma_N", "T_gamma_spin": "T_gamma_spin_N",
@@ -37,7 +38,7 @@ OF_WHEELSETS = {
     "sum_Y": "sum_Y_N", "rolling_radius_difference": "rolling_radius_difference_m",
     "effective_conicity": "effective_conicity",
 }  # fmt: skip
-"""Names in ``output.channels`` of a scene, and the channels of wheels or wheelsets that they stand for."""
+"""Channels of wheels and of wheelsets, by their names in ``output.channels`` of a scene."""
 
 POSE = {"y_m", "z_m", "roll_rad", "yaw_rad"}
 PLACES = {"x_m", "y_m", "z_m", "u_rail_m", "N_N"}
@@ -47,7 +48,7 @@ Groups = Mapping[str, Mapping[str, np.ndarray]]
 
 
 def forces_on_rail(contact: Mapping[str, np.ndarray], side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertical (Q, downwards) and lateral (Y, to the field side) force (n,) of a wheel on its rail, N, from the
+    """Return vertical (Q, downwards) and lateral (Y, to the field side) force (n,) of a wheel on its rail, N, from the
     channels N_N, Fy_N and contact_angle_rad (n, patches) of its contacts.
     """
     loads = contact["N_N"]
@@ -62,9 +63,11 @@ def forces_on_rail(contact: Mapping[str, np.ndarray], side: str) -> tuple[np.nda
 
 
 def creep_work(fx, fy, mz, xi, eta, phi):
-    """Creep work of wheels, shape (...), from forces (N), spin moment (N m), creepages and spin (1/m) of patches (...,
-    patches), NaN where there is none: sums of abs(Fx xi + Fy eta), N, of abs(Fx xi + Fy eta + Mz phi), N, and of -(Fx
-    xi + Fy eta + Mz phi), J/m, which times the rolling speed is the dissipated power.
+    """Return sums over the patches of creep work per metre, each of shape (...).
+
+    They are the sums of abs(Fx xi + Fy eta), N, of abs(Fx xi + Fy eta + Mz phi), N, and of -(Fx xi + Fy eta + Mz phi),
+    J/m; the last one times the rolling speed is the dissipated power. Forces (N), spin moment (N m), creepages and spin
+    creepage (1/m) have shape (..., patches), NaN where there is no patch.
     """
     sliding = fx * xi + fy * eta
     whole = sliding + mz * phi
@@ -72,7 +75,10 @@ def creep_work(fx, fy, mz, xi, eta, phi):
 
 
 def rolling_radius(body: Mapping[str, np.ndarray], contact: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Rolling radius (n,) of a wheel, m, from its wheelset's pose and its contacts; NaN off the rail."""
+    """Return the rolling radius (n,) of a wheel, m, from channels of its wheelset and its contacts.
+
+    It is NaN without contact.
+    """
     roll, yaw = body["roll_rad"][:, None], body["yaw_rad"][:, None]
     ahead, aside, up = contact["x_m"], contact["y_m"] - body["y_m"][:, None], contact["z_m"] - body["z_m"][:, None]
     along = np.cos(roll) * (np.cos(yaw) * aside - np.sin(yaw) * ahead) + np.sin(roll) * up
@@ -80,24 +86,26 @@ def rolling_radius(body: Mapping[str, np.ndarray], contact: Mapping[str, np.ndar
 
 
 def _by_load(contact, values):
-    """Means (n,) of what patches (n, patches) have, by their normal forces; NaN where there is none."""
+    """Return means (n,) of values of patches (n, patches), weighted by normal force; NaN where there is no patch."""
     load = np.nansum(contact["N_N"], axis=-1)
     return np.nansum(contact["N_N"] * values, axis=-1) / np.where(load > 0.0, load, np.nan)
 
 
 def quotient(vertical: np.ndarray, lateral: np.ndarray) -> np.ndarray:
-    """Y/Q; NaN where the wheel is as good as unloaded."""
+    """Return Y/Q; NaN where Q is not above `UNLOADED`."""
     return np.divide(lateral, vertical, out=np.full(np.shape(vertical), np.nan), where=np.asarray(vertical) > UNLOADED)
 
 
 def rolling_speed(body: Mapping[str, np.ndarray], speed: float) -> np.ndarray | float:
-    """Speed of a wheelset, m/s: that of its channels, or the scene's where a run does not hold velocities."""
+    """Return the speed of a wheelset, m/s, from its channels, or the scene's speed if a run has no velocities."""
     return np.linalg.norm([body[f"v{axis}_m_per_s"] for axis in "xyz"], axis=0) if "vx_m_per_s" in body else speed
 
 
 def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Callable[[], np.ndarray]]:
-    """Channels that a group (of a wheel, ``wheelset/left``, or of a wheelset) does not hold but that follow from those
-    that it and its wheels hold: what computes each, by name; the scene's speed in m/s.
+    """Return functions that compute the derived channels of a group, by channel name.
+
+    The group is that of a wheel, ``wheelset/left``, or of a wheelset. Channels that it already contains are omitted.
+    ``speed`` is the scene's speed, m/s.
     """
     wheelset, _, side = group.rpartition("/")
     if side not in SIDES or not wheelset:
@@ -107,7 +115,7 @@ def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Call
     if {"N_N", "Fy_N", "contact_angle_rad"} <= contact.keys():
         found |= {name: partial(_force, contact, side, at) for at, name in enumerate(("Q_N", "Y_N"))}
     if {"Q_N", "Y_N"} <= contact.keys() | found.keys():
-        forces = dict(found)  # a copy: what refers to itself keeps its arrays alive
+        forces = dict(found)  # a copy: a dict that refers to itself would keep its arrays alive
         found["Y_over_Q"] = partial(_quotient, contact, forces)
     if {"Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"} <= contact.keys():
         found |= {name: partial(_work, contact, at) for at, name in enumerate(("T_gamma_N", "T_gamma_spin_N"))}
@@ -138,7 +146,7 @@ def _known(stored, derived, name):
     return stored[name] if name in stored else derived[name]()
 
 
-def _sum(known, name):  # here and below: functions of the file, which other processes find
+def _sum(known, name):  # here and below: functions at module level, so that other processes can unpickle them
     return sum(SIDES[side] * _known(*known[side], name) for side in SIDES)
 
 
@@ -172,8 +180,10 @@ def _pressure(contact):
 
 
 def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, dict[str, np.ndarray]]:
-    """Derived channels by group that a scene asks for (``output.channels``), from groups of a wheelset and its wheels
-    with all channels of contacts; groups without any are left out.
+    """Return the derived channels that a scene requests (``output.channels``), by group.
+
+    ``groups`` are those of a wheelset and its wheels with all channels of contacts. Groups without requested channels
+    are omitted.
     """
     found = {}
     for group, stored in groups.items():

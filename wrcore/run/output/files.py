@@ -1,4 +1,4 @@
-"""Runs in HDF5 files: every dataset says its unit and its meaning, every file how it came about."""
+"""Write and read runs as HDF5 files: each dataset has a unit and a description, each file its scene and settings."""
 
 from __future__ import annotations
 
@@ -24,30 +24,31 @@ from wrcore.run.state import State
 from wrcore.scene.stored import StoredScene
 
 FORMAT = "wrcore run"
-FORMAT_VERSION = 3  # up to version 2 velocities and accelerations stood in the ground's axes
+FORMAT_VERSION = 3  # up to version 2, velocities and accelerations were in the ground's axes
 
 KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
 RECORDS = ("scene", "settings", "counters")
-END = "end"  # group that is no body: the last valid state
+END = "end"  # group of the last valid state (not of a body)
 
 
 @checked
 def write_run(
     path: str | PathLike[str], run: Run, also: Callable[[h5py.File, Run], object] | None = None, compressed: bool = True
 ) -> None:
-    """Write a run; the file appears under its name only when it is complete.
+    """Write a run to a file; the file appears under its name only when it is complete.
 
-    The same run gives the same bytes: no date, host or path is stored. A digest of them stands at the head.
+    Files of identical runs are bitwise identical: no date, host or path is stored. A digest of the bytes is at the
+    beginning of the file.
 
     Parameters
     ----------
     path : path-like
         File to write (HDF5, its name ends in ``.h5`` or ``.hdf5``); its folder is created if needed.
     run : Run
-        What to write.
+        Run to write.
     also : callable, optional
-        Adds to the file.
+        Called with the open file and the run, to add further data.
     compressed : bool
         Whether datasets are compressed.
 
@@ -82,14 +83,14 @@ def _record(values):
 
 
 def _plain(value):
-    """What JSON does not know: numpy's numbers and arrays."""
+    """Convert numpy's numbers and arrays to values that JSON can represent."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} cannot be written to a run file")
 
 
 def _write_end(group, run):
-    """The last valid state, and all that a run needs to go on from there."""
+    """Write the last valid state with its time, the position of its moving frame and its vehicle."""
     text = "13 numbers per body, then own states of force elements and of wheels"
     described = (("t", "s", "time of the last valid state", run.end_t), ("state", "SI", text, run.end_state))
     for name, unit, description, values in described:
@@ -99,7 +100,7 @@ def _write_end(group, run):
 
 
 def write_going_on(file: h5py.File, run: Run, mark: str, places: tuple[np.ndarray, ...]) -> None:
-    """Add what it takes to go on with a run that ends here: a mark of what it belongs to, and its checkpoint."""
+    """Add the data needed to continue a run that ends here: fingerprint, checkpoint and arc lengths (``places``, m)."""
     file.attrs["fingerprint"] = mark
     if run.end is not None:
         write_checkpoint(file[END].create_group("checkpoint"), run.end)
@@ -108,8 +109,9 @@ def write_going_on(file: h5py.File, run: Run, mark: str, places: tuple[np.ndarra
 
 
 def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], counters: dict[str, Any]) -> None:
-    """Write one run file, with the counters of the whole, from files of its stretches in order, a dataset of one
-    stretch in memory at a time; status, reason and end are those of the last one.
+    """Join the files of a run's sections, in order of time, to one run file with the counters of the whole run.
+
+    At most `ROWS` rows of one dataset are in memory at a time. Status, reason and end are those of the last section.
     """
     lengths = [_length(part) for part in parts]
     with new_hdf5(path) as file:
@@ -141,7 +143,7 @@ def _length(part):
 
 
 def _items(file):
-    """Names and items of a file, but for its end."""
+    """Return names and items of a file, except those of the group `END`."""
     found: list[tuple[str, Any]] = []
     file.visititems(lambda name, item: found.append((name, item)))
     return [(name, item) for name, item in found if name.split("/")[0] != END]
@@ -149,7 +151,7 @@ def _items(file):
 
 @checked
 def load_run(path: str | PathLike[str]) -> Run:
-    """Read a run that `write_run` wrote.
+    """Read a run from a file that `write_run` wrote.
 
     Parameters
     ----------
@@ -187,7 +189,7 @@ def load_run(path: str | PathLike[str]) -> Run:
 
 @checked
 def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]:
-    """Read several runs that lie as ``<case>/<name>.h5``.
+    """Read several runs from files ``<case>/<name>.h5``.
 
     Parameters
     ----------
@@ -201,7 +203,7 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
     Raises
     ------
     InputError
-        As `load_run`.
+        If a file cannot be read, see `load_run`.
 
     Examples
     --------
@@ -230,7 +232,7 @@ def _check_format(path, file):
 
 
 def _check_run(path, run):
-    """What every other part of the package relies on."""
+    """Check the conditions that other modules rely on: known status, increasing times, one value or row per time."""
     if run.status not in STATUSES:
         raise InputError(path, "attribute status", one_of(STATUSES, run.status))
     if not isinstance(run.reason, str):
@@ -249,14 +251,14 @@ def _check_run(path, run):
 
 
 def _check_channel(path, name, values, count):
-    """A channel, or its dataset, has one number or row for each of so many times."""
+    """Check that a channel, or its dataset, has one number or row for each of ``count`` times."""
     if values.dtype.kind != "f" or len(values.shape) not in (1, 2) or values.shape[0] != count:
         expected = f"expected {count} numbers or rows of numbers, got {values.dtype} {values.shape}"
         raise InputError(path, name, expected)
 
 
 def _read_frame(file):
-    """A run without its channels."""
+    """Read a run without its channels."""
     records = {name: json.loads(file.attrs[name]) for name in RECORDS}
     records["scene"] = StoredScene(records["scene"]) if isinstance(records["scene"], dict) else records["scene"]
     run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
@@ -272,8 +274,10 @@ def _read_frame(file):
 
 
 def read_part(path: str | PathLike[str]) -> tuple[str, Run, list[np.ndarray]]:
-    """What :func:`write_going_on` added to a stretch of a run, which is read without its channels: the mark (empty if
-    nothing can go on from there), the run, and its places.
+    """Read a section of a run, without its channels, that can be continued.
+
+    Return the fingerprint that :func:`write_going_on` added (empty if the run cannot be continued), the run, and its
+    arc lengths, m.
     """
     with checked_hdf5(path, KIND) as file:
         _check_format(path, file)

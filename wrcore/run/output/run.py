@@ -1,4 +1,4 @@
-"""A run: channels by group, how it ended and what it cost, for a person to look at."""
+"""Results of one simulation: channels by group, how it ended, its counters and settings; tables and plots of them."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class Channels(Mapping[str, np.ndarray]):
     """Channels of one group, as attributes and as items; ``dir`` and completion list them.
 
-    Those of ``derived`` are computed when they are asked for; iteration, length and ``in`` know only those that the run
-    holds.
+    Channels of ``derived`` are computed on access. Iteration, length and ``in`` cover only the channels that are stored
+    in the run.
 
     Examples
     --------
@@ -59,11 +59,11 @@ class Channels(Mapping[str, np.ndarray]):
         return name in self._channels
 
     def follows(self, name: str) -> bool:
-        """Whether a channel is held, or can be computed from those that are."""
+        """Whether a channel is stored, or can be derived from the stored channels."""
         return name in self._channels or name in self._derived
 
     def __getattr__(self, name: str) -> np.ndarray:
-        if name.startswith("_"):  # what copying and pickling ask for before there are any channels
+        if name.startswith("_"):  # copying and pickling access such names before the channels exist
             raise AttributeError(name)
         try:
             return self[name]
@@ -77,7 +77,7 @@ class Channels(Mapping[str, np.ndarray]):
         return len(self._channels)
 
     def names(self) -> list[str]:
-        """Channels that are held, then those that follow from them."""
+        """Return the names of the stored channels, then those of the derived channels."""
         return [*self._channels, *self._derived]
 
     def __dir__(self) -> list[str]:
@@ -96,7 +96,7 @@ class Channels(Mapping[str, np.ndarray]):
 
 @dataclass(repr=False)
 class Run:
-    """One simulated scene: the channels over time, how it ended and what it cost.
+    """Results of one simulated scene: channels over time, how the run ended, counters and settings.
 
     Parameters
     ----------
@@ -105,32 +105,31 @@ class Run:
     status : str
         ``completed``, ``derailed``, ``stalled`` or ``failed``.
     reason : str
-        One line on why the run ended where it did; empty for a completed one.
+        One line on why the run ended; empty for a completed run.
     t : ndarray, shape (n,)
         Output times, s.
     groups : dict of str to dict of str to ndarray
-        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,), in the axes of the track where the
-        body is (:mod:`wrcore.run.output.channels`); a contact's group
-        (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
-        whole model's energies and powers. Names carry the unit.
+        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,), in the axes of the track at the
+        position of the body (:mod:`wrcore.run.output.channels`). A wheel's group (``wheelset/left``) holds arrays of
+        shape (n, patches), NaN where a patch is absent. The group ``energy``, if requested, holds energies and powers
+        of the whole model. Names contain the unit.
     counters : dict
         Plain numbers: steps, rejected, rhs_evaluations, jacobians, factorisations, wall_s, compile_s and others.
     settings : dict
         Flat record of the numerical choices, with the package version.
     end : Checkpoint or None
-        Where a run of the compiled engine stopped, for one that goes on from there.
+        End of a run of the compiled integrator, from which another run can continue.
     end_t : float
-        Time of the last valid state, s: the end of a completed run, else the last accepted step before whatever
-        happened.
+        Time of the last valid state, s: the end of a completed run, else the last accepted step before the run ended.
     end_state : State, shape (size,), or None
-        That state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the force
-        elements' own. An array that knows its time, where the moving frame is and whose it is
-        (:mod:`wrcore.run.state`): :func:`wrcore.run.simulate` takes it as a start.
+        The last valid state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the
+        states of force elements. The array has its time, the position of the moving frame and the names of the vehicle
+        as attributes (:mod:`wrcore.run.state`). :func:`wrcore.run.simulate` takes it as a start.
 
     Examples
     --------
     ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N,
-    ``run["wheelset/left"].Y_N`` the lateral force on the rail, which follows from the contacts' channels
+    ``run["wheelset/left"].Y_N`` the lateral force on the rail, which is derived from the contacts' channels
     (:mod:`wrcore.run.output.derived`).
 
     >>> import numpy as np
@@ -156,7 +155,7 @@ class Run:
 
     @checked
     def __getitem__(self, group: str) -> Channels:
-        """Channels of one group as attributes; KeyError names the groups that exist."""
+        """Return the channels of one group; KeyError names the groups that exist."""
         if group not in self.groups:
             has = f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}"
             raise UnknownNameError("run", "", f"{has}{similar(group, self)}")
@@ -173,7 +172,7 @@ class Run:
         return len(self.groups)
 
     def keys(self) -> list[str]:
-        """Names of the groups."""
+        """Return the names of the groups."""
         return list(self.groups)
 
     def _ipython_key_completions_(self) -> list[str]:
@@ -187,19 +186,19 @@ class Run:
 
     @checked
     def to_pandas(self, tidy: bool = False) -> pd.DataFrame:
-        """All channels as one table.
+        """Return all channels as one table.
 
         Parameters
         ----------
         tidy : bool
             False: a row per output time (index ``t_s``), a column per channel, named ``wheelset.y_m``, and
             ``wheelset/left.N_N.0`` for patch 0 of a wheel. True: a row per value with columns ``t_s``, ``group``,
-            ``channel``, ``patch`` (0 but for contacts), ``value`` and ``unit``, without those that are absent.
+            ``channel``, ``patch`` (0 except for contacts), ``value`` and ``unit``; absent values are omitted.
 
         Returns
         -------
         pandas.DataFrame
-            SI units, as the names say. Patches that never occur in the run are left out.
+            Values in SI units, which the names state. Patches that never occur in the run are omitted.
         """
         import pandas as pd
 
@@ -217,7 +216,7 @@ class Run:
         return pd.concat(parts, ignore_index=True).dropna(subset="value", ignore_index=True)
 
     def columns(self) -> Iterator[tuple[tuple[Any, ...], np.ndarray]]:
-        """Channels one by one, those of contacts patch by patch."""
+        """Yield name and values (n,) of each channel, those of contacts patch by patch."""
         for group, channels in self.groups.items():
             for name, values in channels.items():
                 if values.ndim == 1:
@@ -228,14 +227,14 @@ class Run:
                             yield (group, name, patch), column
 
     def to_xarray(self) -> xarray.DataTree:
-        """All channels as a tree of data sets, for xarray (``pip install xarray``).
+        """Return all channels as an xarray tree of data sets (``pip install xarray``).
 
         Returns
         -------
         xarray.DataTree
-            A node per group (``tree["wheelset/left"]``) with a variable per channel over ``t_s``, of contacts over
-            ``t_s`` and ``patch``. Attributes are ``units`` and ``long_name``, those of the root the run's name, status,
-            settings and counters. Channels are SI, and views of the run's.
+            A node per group (``tree["wheelset/left"]``) with a variable per channel over ``t_s``; variables of contacts
+            are over ``t_s`` and ``patch``. Attributes of variables are ``units`` and ``long_name``, attributes of the
+            root the run's name, status, settings and counters. Channels are in SI units and share the run's memory.
 
         Raises
         ------
@@ -261,12 +260,12 @@ class Run:
 
     @checked
     def wheel_forces(self, wheelset: str = "wheelset") -> pd.DataFrame:
-        """Forces, wear and pressure of a wheelset's wheels over time.
+        """Return forces, wear and pressure of a wheelset's wheels over time as a table.
 
         Parameters
         ----------
         wheelset : str
-            Name of its group.
+            Name of the wheelset's group.
 
         Returns
         -------
@@ -290,18 +289,18 @@ class Run:
         Parameters
         ----------
         *channels : str
-            Such as ``"wheelset.yaw_rad"`` or ``"wheelset/left.N_N"``, a panel each. Without any: lateral position and
+            Such as ``"wheelset.yaw_rad"`` or ``"wheelset/left.N_N"``, one panel each. By default: lateral position and
             yaw of the wheelsets and, if the run has contacts, the vertical and the lateral force of each wheel.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Shown by a notebook; ``figure.savefig("run.png")`` writes it.
+            A notebook shows it; ``figure.savefig("run.png")`` writes it.
 
         Raises
         ------
         InputError
-            For a channel that the run does not have.
+            If the run does not have a channel.
         """
         return wrcore.plot_run(self, channels)
 
