@@ -1,1 +1,1 @@
-"""What anybody asks of their own runs and scenes: motion, wheel forces, modes, critical speeds, contact, plots."""
+"""Analysis of runs and scenes: assessment, contact, response, stability, wear and plots."""

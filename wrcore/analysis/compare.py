@@ -1,4 +1,4 @@
-"""Two runs beside each other: what a modelling choice changes, channel by channel."""
+"""Compare two runs channel by channel, to quantify the effect of a modelling choice."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from wrcore.run.output.run import Run
 from wrcore.run.simulation import flat
 
 SAME_TIME = 1e-9
-"""Output times of two runs that are closer than this are the same, s."""
+"""Largest difference between output times of two runs that are treated as equal, s."""
 
 PLACES = ("x_m", "y_m", "z_m", "s_m", "u_wheel_m", "u_rail_m", "s_wheel_rad", "rolling_radius_m")
 MOTION = ("m", "rad", "m/s", "rad/s", "m/s^2")
-"""Channels of contacts, and units of those of bodies, whose zero means little: they are measured by how they vary."""
+"""Channels of contacts, and units of channels of bodies, whose zero is arbitrary: their scale is their variation."""
 
 ACCURACIES = {"y": "y_m", "Y": "Y_N", "Q": "Q_N", "wear": "T_gamma_N"}
-"""Channel that the error of :func:`wrcore.simulate_to_accuracy` is of, by what it was asked of."""
+"""Channel of the error that :func:`wrcore.simulate_to_accuracy` states, by the name of the requested quantity."""
 
 LEAST = 1e-9
-"""Scale of a place or motion, at least, in its unit: what varies by less is rounding."""
+"""Smallest scale of a position or motion, in its unit: smaller variation is rounding noise."""
 
 NAMED = 6
-"""Bodies and wheels that are named where only one run has them."""
+"""Largest number of groups that are named if only one run has them."""
 
 SHOWN = {"y_m": False, "yaw_rad": False, "Q_N": True, "Y_N": True}
-"""Channels that are drawn unless others are asked for, of bodies or of contacts."""
+"""Channels that are drawn by default; the value is True for channels of contacts, False for channels of bodies."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Comparison:
-    """How two runs differ; prints itself as a table with a row per channel, of the group where it differs most.
+    """Differences of two runs; its text form is a table with a row per channel, for the group with the largest
+    difference.
 
     Examples
     --------
@@ -58,15 +59,15 @@ class Comparison:
 
     runs: tuple[Run, Run]
     changes: dict[str, tuple[Any, Any]]
-    """Keys of the scenes that differ, with both values; None where a scene has none."""
+    """Keys of the scenes that differ, with both values; None if a scene does not have the key."""
     t: np.ndarray
-    """Output times that both have, s."""
+    """Output times common to both runs, s."""
     table: pd.DataFrame
     """A row per group and channel; columns: :func:`compare`."""
 
     @property
     def summary(self) -> pd.DataFrame:
-        """Of each channel of bodies and of contacts the row with the largest relative difference, the largest first."""
+        """Rows with the largest relative difference of each channel, of bodies and of contacts, the largest first."""
         order = self.table.sort_values("relative", ascending=False, kind="stable")
         again = pd.DataFrame({"channel": order["channel"], "contact": order["group"].str.contains("/")}).duplicated()
         return order[~again].reset_index(drop=True)
@@ -79,7 +80,7 @@ class Comparison:
         return "\n".join([times, *keys, *self._left_out(), rows])
 
     def _left_out(self) -> Iterator[str]:
-        """A line for each run that has bodies or wheels of its own."""
+        """Yield a line for each run with bodies or wheels that the other run does not have."""
         for which, one, other in zip(("first", "second"), self.runs, self.runs[::-1], strict=True):
             if alone := [group for group in one if group not in other]:
                 more = f" and {len(alone) - NAMED} more" if len(alone) > NAMED else ""
@@ -93,8 +94,8 @@ class Comparison:
         Parameters
         ----------
         *channels : str
-            Such as ``"wheelset/left.Q_N"``, a row each. Without any: lateral position, yaw, vertical and lateral force,
-            each where it differs most.
+            Such as ``"wheelset/left.Q_N"``, a row each. By default: lateral position, yaw, vertical and lateral force,
+            each of the group with the largest difference.
 
         Returns
         -------
@@ -103,7 +104,7 @@ class Comparison:
         Raises
         ------
         InputError
-            For a channel that the runs do not both have.
+            If one of the runs does not have a channel.
         """
         channels = channels or self._shown()
         pairs = [tuple(values_of(run, channel) for run in self.runs) for channel in channels]
@@ -132,7 +133,8 @@ class Comparison:
         return figure
 
     def _shown(self) -> tuple[str, ...]:
-        """The channels of `SHOWN` where they differ most, or those that differ most."""
+        """Return the channels of `SHOWN`, each in the group with the largest difference, else the channels that differ
+        most."""
         order = self.summary.itertuples()
         worst = {(row.channel, "/" in row.group): f"{row.group}.{row.channel}" for row in order}
         return tuple(worst[key] for key in SHOWN.items() if key in worst) or tuple(worst.values())[: len(SHOWN)]
@@ -140,10 +142,10 @@ class Comparison:
 
 @checked
 def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Comparison:
-    """Compare two runs: what does a modelling choice change?
+    """Compare two runs channel by channel, to quantify the effect of a modelling choice.
 
-    Each channel that both have, or that follows from what both have, at the output times that both have; the channels
-    of contacts patch by patch where a wheel has equally many patches in both.
+    All stored or derived channels that both runs have are compared at their common output times. Channels of contacts
+    are compared patch by patch, at times at which a wheel has the same number of patches in both runs.
 
     Parameters
     ----------
@@ -154,17 +156,18 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
     -------
     Comparison
         ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``: of the
-        difference b - a (the mean with its sign); ``t_max_s``: when it is largest. ``scale``: root mean square of the
-        channel; for places and motions their standard deviation, or how far the runs' means are apart; the largest of
-        both runs and all groups, 1e-9 at least, so that what hardly moves is no scale. ``relative``: rms over scale.
-        ``error``: what the runs state of their own errors, added as squares; NaN where they state none. Runs of
-        :func:`wrcore.simulate_to_accuracy` state that of y, Y or Q (rms) or wear (of the mean), those that look contact
-        up the largest ones of N and Q. ``compared``: share of the common times at which both have a value.
+        difference b - a (the mean with its sign); ``t_max_s``: time of its maximum. ``scale``: root mean square of the
+        channel; for positions and motions their standard deviation, or the difference of the runs' means. It is the
+        largest value of both runs and all groups, for positions and motions at least 1e-9. ``relative``: rms over
+        scale. ``error``: root of the sum of squares of the errors that the runs state; NaN if they state none. Runs of
+        :func:`wrcore.simulate_to_accuracy` state the error of y, Y or Q (rms) or wear (of the mean). Runs with a lookup
+        table of contact state the largest errors of N and Q. ``compared``: fraction of the common times at which both
+        have a value.
 
     Raises
     ------
     InputError
-        For files that are no runs, and runs with less than two output times, or no channel, in common.
+        If a file is not a run, or if the runs have less than two output times, or no channel, in common.
 
     Examples
     --------
@@ -200,7 +203,7 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
 
 
 def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places in both of the times that two runs have in common."""
+    """Return the indices, in both runs, of their common output times."""
     if not len(one) or not len(other):
         return np.empty(0, int), np.empty(0, int)
     near = np.minimum(np.searchsorted(other, one - SAME_TIME), len(other) - 1)
@@ -209,7 +212,7 @@ def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _channel_difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Difference of a channel; of patches none where one of the runs has more than the other."""
+    """Return the difference of a channel; NaN for patches at times at which the runs have different numbers of them."""
     width = min(part.shape[1:] for part in (one, other))
     if not width:
         return other - one
@@ -218,7 +221,10 @@ def _channel_difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _scale(of_contact: bool, name: str, *pair: np.ndarray) -> float:
-    """The larger root mean square of both, of places and motions the larger standard deviation or their distance."""
+    """Return the scale of a channel: the larger root mean square of both runs.
+
+    For positions and motions it is the largest of both standard deviations, the difference of the means and `LEAST`.
+    """
     finite = [values[np.isfinite(values)] for values in pair]
     if not all(values.size for values in finite):
         return 0.0
@@ -229,7 +235,7 @@ def _scale(of_contact: bool, name: str, *pair: np.ndarray) -> float:
 
 
 def _row(runs, t, group, name, pair, scale) -> Iterator[dict[str, Any]]:
-    """The row of a channel, none where the runs nowhere both have a value."""
+    """Yield the row of a channel; no row if there is no time at which both runs have a value."""
     apart = _channel_difference(*pair).reshape(len(t), -1)
     known = np.isfinite(apart)
     if not known.any():
@@ -247,7 +253,7 @@ def _row(runs, t, group, name, pair, scale) -> Iterator[dict[str, Any]]:
 
 
 def _stated(run: Run, group: str, name: str, scale: float) -> Iterator[float]:
-    """Errors that a run states of one of its channels."""
+    """Yield the errors that a run states for one of its channels."""
     of = ACCURACIES.get(str(run.settings.get("accuracy_of")))
     if name == of and (name != "y_m" or group in wheelsets_of(run)):
         yield float(run.settings["accuracy_found"])

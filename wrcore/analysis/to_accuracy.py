@@ -1,8 +1,9 @@
-"""Runs to a wanted accuracy: the differences of runs at several tolerances say how large the error of the last one is.
+"""Simulate to a required accuracy: estimate the error of the last run from differences of runs at several tolerances.
 
-Errors fall as the tolerance to a power p. Runs whose tolerances have the ratio r then differ by d, and the tighter one
-has an error of d/(r^p - 1). The last two differences give p. It is 1 at most, although errors of smooth motion fall
-faster, and smaller where impacts make errors fall slowly. After the first two runs it is taken as 1.
+Errors are proportional to a power p of the tolerance. If runs whose tolerances have the ratio r differ by d, the run
+with the smaller tolerance has an error of d/(r^p - 1). The last two differences determine p. It is limited to 1,
+although errors of smooth motion decrease faster. It is smaller if impacts make errors decrease slowly. After the first
+two runs p = 1 is assumed.
 """
 
 from __future__ import annotations
@@ -23,58 +24,59 @@ from wrcore.run.simulate import simulate
 from wrcore.scene.description import Source, as_scene
 
 QUANTITIES = {"y": "m", "Y": "N", "Q": "N", "wear": "N"}
-"""What an accuracy can be asked of, and its unit: lateral position of the wheelsets, lateral and vertical wheel forces
-(root mean square over time and wheels), mean wear number T gamma of a wheel."""
+"""Quantities for which an accuracy can be required, with their units: lateral position of the wheelsets, lateral and
+vertical wheel forces (root mean square over time and wheels), mean wear number T gamma of a wheel."""
 
 SAFETY = 5.0
-"""Factor on the estimated error of a run, tuned on 15 random scenes. With 2 the error of one is 2.9 um where 1 um was
-asked for; with 9 all runs to 1 um cost a quarter more."""
+"""Safety factor on the estimated error of a run, tuned on 15 random scenes. With 2 the error of one of them is 2.9 µm
+instead of 1 µm; with 9 all runs to 1 µm cost a quarter more."""
 
 STEADY, BELIEVED = 0.7, (1.0, 9.0)
-"""Power of the tolerance below which differences do not fall steadily: impacts or instability decide, and that two runs
-agree may be chance, so two pairs in a row must. And how many times as large as the tighter run's error a difference is
-taken to be at least and at most: a wheelset on rough rails had 2.4 where the power 1 has 14."""
+"""Power of the tolerance below which differences do not decrease steadily: impacts or instability dominate. Then two
+runs may agree by chance, so two successive pairs must agree. Second: bounds of the ratio of a difference to the error
+of the run with the smaller tolerance: a wheelset on rough rails had 2.4, where the power 1 predicts 14."""
 
 FIRST_RTOL = {"y": 1e3, "Y": 1e-4, "Q": 1e-5, "wear": 0.3}
-"""First tolerance per unit of accuracy. Half of the scenes need no third run then."""
+"""First tolerance per unit of accuracy, chosen so that half of the scenes need no third run."""
 
 LOOSEST, TIGHTEST = 1e-2, 1e-11
-"""Range of tolerances. Looser ones save nothing: stability, or the motion itself, bounds the steps there."""
+"""Range of relative tolerances. Larger ones save no time: stability or the motion itself limits the steps there."""
 
 TIGHTER, FINER = 0.1, (10.0**-0.5, 10.0**-1.5)
-"""Ratio of the second tolerance to the first, and of later ones where differences do not fall steadily; and the largest
-and least ratio of each later one to the one before elsewhere."""
+"""Ratio of the second tolerance to the first, also used later if differences do not decrease steadily; largest and
+smallest ratio of successive tolerances otherwise."""
 
 SHORTER = 0.2
-"""The longest step falls as the tolerance to this power, lest two runs take the same steps and agree."""
+"""Power of the tolerance to which the longest step is proportional, so that two runs do not agree because they take the
+same steps."""
 
 ORDER = 1.3
-"""Power of the tolerance with which errors are expected to fall in the choice of the next tolerance."""
+"""Power of the tolerance with which errors are expected to decrease, for the choice of the next tolerance."""
 
 RELIABLE = 1e-4
-"""A run that fails at a looser tolerance may complete at a tighter one."""
+"""Largest relative tolerance at which a failed run is final: at larger ones a smaller tolerance may help."""
 
 SHRINKING, PATIENCE = 0.5, 4
-"""Where none of so many differences is less than this part of the least one before them, the tolerance does not decide.
-Impacts keep differences as large for some tolerances until all runs agree on when they happen."""
+"""If none of the last 4 differences is below 0.5 times the smallest earlier one, the tolerance has no effect on the
+error. Impacts keep differences equally large over some tolerances, until all runs agree on the times of impacts."""
 
 COMPLETE = ("completed", "derailed")
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How a run to an accuracy went."""
+    """Result of a simulation to a required accuracy: estimated error, tolerance and cost."""
 
     of: str
     """A key of `QUANTITIES`."""
     asked: float
     found: float
-    """Estimated error of the run times `SAFETY`: nearly always more than its error."""
+    """Estimated error of the run times `SAFETY`; the true error is nearly always smaller."""
     reached: bool
     rtol: float
     """Relative tolerance of the run."""
     cost: float
-    """Evaluations of the equations in all runs over those in the one that is handed out."""
+    """Evaluations of the equations in all runs over those in the returned run."""
     reason: str
 
 
@@ -82,10 +84,10 @@ class Accuracy:
 def simulate_to_accuracy(
     scene: Source, accuracy: float, of: str = "y", progress: Callable | None = None
 ) -> tuple[Run, Accuracy]:
-    """Run a scene until its error is below a bound, by the differences of runs at several tolerances.
+    """Simulate a scene at smaller and smaller tolerances until its estimated error is below a bound.
 
-    The scene's model stays; method (`auto`), tolerance and longest step are chosen. The last run, the most accurate, is
-    handed out. All runs together cost about twice as much, at most some four times.
+    The scene's model is not changed; method (`auto`), tolerance and longest step are chosen. The last run, which is the
+    most accurate, is returned. All runs together cost about twice as much as this run, at most about four times.
 
     Parameters
     ----------
@@ -101,15 +103,15 @@ def simulate_to_accuracy(
     Returns
     -------
     run : Run
-        Its settings hold the accuracy, too: ``accuracy_of``, ``accuracy_found`` and so on.
+        The most accurate run. Its settings contain the accuracy, too: ``accuracy_of``, ``accuracy_found`` and so on.
     accuracy : Accuracy
-        ``reached`` is False beyond the prediction horizon (impacts, hunting that amplifies every difference), where no
-        tolerance helps, and where runs fail.
+        ``reached`` is False if runs fail, or beyond the prediction horizon (impacts, hunting that amplifies every
+        difference), where a smaller tolerance does not help.
 
     Raises
     ------
     InputError
-        For an unknown quantity, an accuracy that is not positive, or channels that are missing.
+        If the quantity is unknown, the accuracy is not positive, or channels are missing.
 
     Examples
     --------
@@ -132,7 +134,7 @@ def simulate_to_accuracy(
         spent += run.counters["rhs_evaluations"]
         if before is not None:
             alike = run.status == before.status and run.status in COMPLETE
-            alike &= abs(run.t.size - before.t.size) <= 1  # those that derail do so between the same output times
+            alike &= abs(run.t.size - before.t.size) <= 1  # derailed runs must end between the same output times
             differences.append(difference(before, run, of) if alike else math.inf)
             if progress is not None:
                 progress(f"rtol {rtol:g}: {of} differs by {differences[-1]:.2g} {QUANTITIES[of]} from the run before")
@@ -155,7 +157,7 @@ def simulate_to_accuracy(
 
 
 def _at(scene, rtol, longest):
-    """The scene with another tolerance and longest step; steps are controlled."""
+    """Return the scene with another relative tolerance, longest step times ``longest`` and step size control."""
     data = copy.deepcopy(scene.data)
     integration = data["integration"]
     integration |= {"method": "auto", "rtol": rtol, "atol": 0.0, "step": 0.0}
@@ -164,7 +166,8 @@ def _at(scene, rtol, longest):
 
 
 def _order(before, last, ratio):
-    """Power of the tolerance with which one difference fell to the next, which is of runs ``ratio`` times as tight."""
+    """Return the power of the tolerance with which differences decrease, from two successive ones; the tolerances of
+    the second have the factor ``ratio``."""
     if not 0.0 < last < math.inf or before == 0.0:
         return 1.0
     fallen = math.log(last / before) / math.log(ratio) if before < math.inf else 0.0
@@ -172,15 +175,17 @@ def _order(before, last, ratio):
 
 
 def _estimated(differences, ratios):
-    """Error of the last run times `SAFETY`, from all differences of a run to the one before and the ratios of their
-    tolerances, and the power of the tolerance with which errors fall."""
+    """Return the error of the last run times `SAFETY`, and the power of the tolerance with which errors decrease.
+
+    Arguments are the differences of all successive runs and the ratios of their tolerances.
+    """
     *earlier, last = differences
     order = _order(earlier[-1], last, ratios[-2]) if earlier else 1.0
     return SAFETY * last / min(max(ratios[-1] ** -order - 1.0, BELIEVED[0]), BELIEVED[1]), order
 
 
 def _is_steady(differences, ratios, accuracy):
-    """Whether the last difference is small by no chance."""
+    """Whether the last difference is not small by chance: differences decrease steadily, or two in a row are small."""
     if len(differences) < 3:
         return True
     first, second, _ = differences[-3:]
@@ -188,14 +193,15 @@ def _is_steady(differences, ratios, accuracy):
 
 
 def _next_ratio(missing, order):
-    """Ratio of the next tolerance to the last one, where the estimated error is ``missing`` times what is allowed."""
+    """Return the ratio of the next tolerance to the last one; ``missing`` is the estimated error over the required
+    accuracy."""
     if order < STEADY or not 1.0 < missing < math.inf:
         return TIGHTER
     return min(max(missing ** (-1.0 / (ORDER if order == 1.0 else order)), FINER[1]), FINER[0])
 
 
 def _end(run, differences, rtol):
-    """Why there is no use in going on, or an empty string."""
+    """Return the reason why smaller tolerances do not help, or an empty string."""
     if run.status not in COMPLETE and rtol <= RELIABLE:
         return f"the run {run.status}: {run.reason}"
     before, late = differences[:-PATIENCE], differences[-PATIENCE:]
@@ -205,8 +211,10 @@ def _end(run, differences, rtol):
 
 
 def difference(one: Run, other: Run, of: str = "y") -> float:
-    """Difference of two runs of one scene in a quantity of `QUANTITIES`, over the times that both have reached: root
-    mean square over times and wheelsets or wheels, for wear of the mean over time; infinite without a time in common.
+    """Return the difference of two runs of one scene in a quantity of `QUANTITIES`, over their common times.
+
+    It is the root mean square over times and wheelsets or wheels; for wear that of the mean over time. It is infinite
+    without a common time.
     """
     count = min(len(one.t), len(other.t))
     if count == 0:
@@ -219,7 +227,7 @@ def difference(one: Run, other: Run, of: str = "y") -> float:
 
 
 def _series(run, of):
-    """A quantity's time series, one per wheelset or wheel."""
+    """Return the time series of a quantity, one per wheelset or wheel."""
     wheelsets = wheelsets_of(run)
     if of == "y":
         return [run[name].y_m for name in wheelsets]

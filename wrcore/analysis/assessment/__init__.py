@@ -1,1 +1,1 @@
-"""What standards and engineers ask of a run: forces, ride, safety."""
+"""Assessment of a run by standards: wheel forces, ride comfort and safety against derailment."""

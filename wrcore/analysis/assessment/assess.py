@@ -1,8 +1,8 @@
 """Assessment of a run by EN 14363: filters, sections of straight track and curves, percentiles, limits.
 
-What is evaluated, and where from. Limits are recalled from EN 14363:2005 and its successor of 2016, not read; filters
-and percentiles were compared with gensys.se/course/UIC518_tests.html (after UIC 518 and a draft of EN 14363). The
-column ``source`` of each table states both.
+Quantities and their sources. Limits are recalled from EN 14363:2005 and its successor of 2016, not read. Filters and
+percentiles were compared with gensys.se/course/UIC518_tests.html (after UIC 518 and a draft of EN 14363). The column
+``source`` of each table states both.
 
 * sum Y (guiding forces of a wheelset): low-pass 20 Hz, sliding mean over 2 m in steps of 0.5 m; limit K (10 kN + 2 Q0 /
   3), K = 1, freight wagons 0.85.
@@ -11,14 +11,15 @@ column ``source`` of each table states both.
   (above 160 km/h the standard's cap is lower, recalled with low confidence: not applied).
 * Y_qst, Q_qst (quasi-static, full curves only): medians; limits 60 kN and 145 kN.
 
-The page states the corner frequency of the low-pass (20 Hz or more), not its kind: a Butterworth filter of fourth
-order, applied forwards, is chosen here. It starts as if the signal had always been at its first value; the means leave
-out the first 0.2 s, in which it settles. Y/Q of a wheel that carries nothing is bridged by a straight line for the
-low-pass and left out of the mean. A sliding mean is over the way the wheelset has gone, forwards or backwards, and is
-known where a whole window is. Q0 is the mean of Q over a wheelset's wheels and the whole run. Percentiles are 0.15 %,
-50 % and 99.85 % within a section; the larger size of the outer two counts. Those of means are of the first output time
-of every 0.5 m, those of wheel forces of all output times. What the standard adds, statistics over the sections of many
-runs, is :func:`section_statistics`; an assessment compares the worst section of its run with the limit.
+The page states the corner frequency of the low-pass (20 Hz or more), not its kind. Here it is a Butterworth filter of
+fourth order, applied forwards. Its initial condition is the steady state for the first value of the signal. The means
+omit the first 0.2 s, in which the filter settles. Where a wheel is unloaded, Y/Q is interpolated linearly for the
+low-pass and omitted from the mean. A sliding mean is over the distance that the wheelset has travelled, forwards or
+backwards, and exists where the whole window lies within the run. Q0 is the mean of Q over a wheelset's wheels and the
+whole run. Percentiles are 0.15 %, 50 % and 99.85 % within a section; the larger absolute value of the outer two is
+compared with the limit. Percentiles of means use the first output time of every 0.5 m, those of wheel forces all output
+times. An assessment compares the worst section of its run with the limit. The standard's statistics over the sections
+of many runs are in :func:`section_statistics`.
 """
 
 from __future__ import annotations
@@ -42,15 +43,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PERCENTILES = (0.15, 50.0, 99.85)
-WINDOW = 2.0  # of the sliding means, m
-STEP = 0.5  # of the sliding means, m
-CUT = 20.0  # of the low-pass, Hz
+WINDOW = 2.0  # window of the sliding means, m
+STEP = 0.5  # step of the sliding means, m
+CUT = 20.0  # corner frequency of the low-pass, Hz
 
 SETTLED = 0.2
-"""Time after which the start of the low-pass is below 1e-4 of a step, s: its slowest pole decays with 48 1/s."""
+"""Settling time of the low-pass, s: then its step response has an error below 1e-4; its slowest pole decays with 48
+1/s."""
 
 LEAST_RATE = 1000.0
-"""What lies above half of the output rate comes back as lower frequencies: see reports/assessment.md, 1/s."""
+"""Smallest output rate, 1/s: frequencies above half of the output rate are aliased, see reports/assessment.md."""
 
 STRAIGHT_SECTION, WIDE_SECTION, TIGHT_SECTION, TIGHT = 250.0, 100.0, 70.0, 400.0
 """Lengths of sections on straight track, in curves of at least the radius ``TIGHT`` and in tighter ones, m."""
@@ -60,17 +62,17 @@ SOURCES = {
     "sum_Y": FILTERED, "Y_over_Q": FILTERED, "Y_qst": f"{FILTERED}; low confidence in tight curves",
     "Q": f"{FILTERED}; low confidence above 160 km/h", "Q_qst": FILTERED,
 }  # fmt: skip
-"""Sources of the limit and the filter of each quantity; none was read in the standard."""
+"""Sources of the limit and the filter of each quantity; none of them was read in the standard."""
 
 MEANS = "sum_Y", "Y_over_Q"
-"""Quantities that are sliding means, in steps of `STEP`."""
+"""Quantities that are averaged by sliding means, in steps of `STEP`."""
 
 STANDARDS = ("EN 14363", "EN 12299", "ISO 2631")
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What a run is worth by a standard; prints itself as a table.
+    """Assessment of a run by a standard; its text form is a table.
 
     Examples
     --------
@@ -91,11 +93,11 @@ class Assessment:
     series: pd.DataFrame = field(default_factory=pd.DataFrame)
     """EN 14363: the filtered quantities over time (index ``t_s``), columns quantity, wheelset and side; else empty."""
     limits: dict[str, dict[str, float]] = field(default_factory=dict)
-    """EN 14363: by wheelset, of each quantity; NaN where the standard states none."""
+    """EN 14363: limit of each quantity by wheelset; NaN if the standard states no limit."""
 
     @checked
     def plot(self) -> Figure:
-        """Draw the filtered series that the percentiles are of, with their limits (dashed).
+        """Draw the filtered series from which the percentiles are computed, with their limits (dashed).
 
         Returns
         -------
@@ -105,7 +107,7 @@ class Assessment:
         Raises
         ------
         InputError
-            For another standard than EN 14363: the others have no limits.
+            For other standards than EN 14363, which have no limits.
         """
         from wrcore.analysis.pictures.plot_assessment import plot_assessment
 
@@ -120,18 +122,18 @@ class Assessment:
 def assess(
     run: Run, standard: Annotated[str, OneOf(STANDARDS)] = "EN 14363", begin: float = 0.0, freight: bool = False
 ) -> Assessment:
-    """Assess a run.
+    """Assess a run by a standard for forces, ride comfort or whole-body vibration.
 
     Parameters
     ----------
     run : Run
-        With contact channels, or s or x of wheelsets and Q and Y of wheels (EN 14363; at least 1000 1/s), or
-        poses and accelerations of bodies (the others; at least 200 1/s).
+        EN 14363 needs contact channels, or s or x of wheelsets and Q and Y of wheels, at 1000 1/s or more. The other
+        standards need the channels ``pose`` and ``acceleration`` of bodies at 200 1/s or more.
     standard : {"EN 14363", "EN 12299", "ISO 2631"}
     begin : float
         Start of the evaluation, s.
     freight : bool
-        Limits of freight wagons.
+        Whether the limits of freight wagons apply.
 
     Returns
     -------
@@ -140,8 +142,8 @@ def assess(
     Raises
     ------
     InputError
-        For an unknown standard, a run without the channels or with less than a window of 2 m after the first 0.2 s, too
-        low an output rate, or a begin that is no time of the run.
+        If the standard is unknown, if the run has not the channels, too low an output rate or less than a window of 2 m
+        after the first 0.2 s, or if ``begin`` is outside the run.
 
     Examples
     --------
@@ -163,29 +165,28 @@ def assess(
 def section_statistics(
     assessments: Annotated[Sequence[Assessment], Within()], k: Annotated[float, Within(0.0, 100.0)]
 ) -> pd.DataFrame:
-    """Statistics over the sections of many runs, as EN 14363 estimates greatest values: mean + k times the standard
-    deviation.
+    """Estimate maximum values over the sections of many runs by EN 14363: mean + k times the standard deviation.
 
     Parameters
     ----------
     assessments : sequence of Assessment
-        By EN 14363, of runs of one vehicle.
+        Assessments by EN 14363 of runs of one vehicle.
     k : float
-        The standard's factor for the quantity that is looked at. It has no default: its values were not read.
+        The standard's factor for the quantity. It has no default, because its values were not read.
 
     Returns
     -------
     pandas.DataFrame
         A row per quantity, kind of track (straight; wide curves, of at least 400 m; tight curves), wheelset and side:
-        sections, their number; mean, standard_deviation (NaN of one section), largest and estimated_maximum of their
-        values, in N, Y/Q a number; limit, the smallest of all runs, and share, estimated_maximum over it; source, what
-        the limit stands on. The value of a section is the larger size of its 0.15 % and 99.85 % percentiles, of Q that
-        of 99.85 %, quasi-static that of its median.
+        sections, their number; mean, standard_deviation (NaN for one section), largest and estimated_maximum of their
+        values, in N, Y/Q a number; limit, the smallest of all runs; share, estimated_maximum over limit; source, the
+        source of the limit. The value of a section is the larger absolute value of its 0.15 % and 99.85 % percentiles.
+        For Q it is that of 99.85 %, for quasi-static quantities that of the median.
 
     Raises
     ------
     InputError
-        For assessments by another standard.
+        If an assessment is by another standard.
 
     Examples
     --------
@@ -213,14 +214,15 @@ def section_statistics(
 
 
 def _sizes(sections):
-    """The value of each section of one or of several quantities that is held against a limit."""
+    """Return the value of each section that is compared with a limit."""
     outer = sections[["p0_15", "p99_85"]].abs().max(axis=1)
     outer = outer.where(sections["quantity"] != "Q", sections["p99_85"].abs())
     return outer.where(~sections["quantity"].str.endswith("_qst"), sections["p50"].abs())
 
 
 def low_pass(values, rate, cut=CUT):
-    """Signal (n,) after a Butterworth low-pass of fourth order, as if always at its first value; rates in Hz."""
+    """Filter a signal (n,) by a Butterworth low-pass of fourth order, initially steady at the first value; rates in
+    Hz."""
     from scipy import signal
 
     values = np.asarray(values, float)
@@ -229,13 +231,13 @@ def low_pass(values, rate, cut=CUT):
 
 
 def sliding_mean(s, values, window=WINDOW):
-    """Mean of values (n,), NaN left out, over a window (m) centred at each place of the way gone s (m, never falling);
-    NaN where the window reaches beyond an end or holds no value.
+    """Return means (n,) of values (n,), without NaN, over a window (m) centred at each distance travelled ``s`` (m, not
+    decreasing); NaN where the window extends beyond an end or contains no value.
     """
     s, values = np.asarray(s, float), np.asarray(values, float)
     known = np.isfinite(values)
 
-    def integral(y):  # over the way, by trapezoids
+    def integral(y):  # over the distance, by the trapezoidal rule
         total = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(s))])
         return np.interp(s + 0.5 * window, s, total) - np.interp(s - 0.5 * window, s, total)
 
@@ -245,9 +247,11 @@ def sliding_mean(s, values, window=WINDOW):
 
 
 def track_sections(path, end, begin=0.0):
-    """Straight stretches and full curves, without transitions, of ``track.path`` from ``begin`` to ``end`` (m), cut
-    into sections of the standard's length: begin, end (m) and radius (m, signed, infinite where straight) of each.
-    Stretches shorter than a section are one.
+    """Divide straight track and full curves of ``track.path`` from ``begin`` to ``end`` (m) into sections of the
+    standard's length, without transitions.
+
+    Return begin, end (m) and radius (m, signed, infinite where straight) of each section. A straight or curve shorter
+    than this length is one section.
     """
     path = [{"tangent": max(end, 0.0)}] if isinstance(path, str) else path
     s = min(begin, 0.0)
@@ -270,9 +274,10 @@ def track_sections(path, end, begin=0.0):
 
 
 def section_table(run, begin=0.0):
-    """Percentiles of the filtered quantities (columns p0_15, p50, p99_85, in N; Y/Q a number) per section, wheelset and
-    side from ``begin`` (s) on, Q0 (N) by wheelset, its mean Q over the whole run, and the filtered quantities (a column
-    each) over time from ``begin`` on.
+    """Return percentiles per section, wheel loads Q0 and the filtered quantities of a run from ``begin`` (s) on.
+
+    The first result has columns p0_15, p50, p99_85 (N; Y/Q a number) and a row per section, wheelset and side. Q0 (N),
+    by wheelset, is the mean Q over the whole run. The third result has a column per filtered quantity over time.
     """
     rate, late = rate_of(run, LEAST_RATE, "EN 14363"), output_times_after(run, begin, "EN 14363")
     wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]
@@ -307,7 +312,7 @@ def section_table(run, begin=0.0):
 
 
 def _filtered(forces, way, rate, settled):
-    """Quantity, side and filtered signal of a wheelset and its wheels; means where the low-pass has ``settled``."""
+    """Yield quantity, side and filtered signal of a wheelset and its wheels; means only where ``settled`` is true."""
 
     def mean(values):
         known, places = np.isfinite(values), np.arange(len(values))
@@ -339,7 +344,7 @@ def _limits(wheel_load, freight):
 
 
 def _summary(sections, limits):
-    """Worst value of each quantity by its wheelset's own limit, where it was found, and the limit."""
+    """Return the worst value of each quantity relative to its wheelset's limit, with its location and the limit."""
     rows = []
     for quantity in next(iter(limits.values())):
         part = sections[sections["quantity"] == quantity]

@@ -1,7 +1,8 @@
-"""Ride of a run's bodies: frequency weightings of accelerations, comfort and Sperling's index.
+"""Ride comfort of a run's bodies: frequency weightings of accelerations, comfort indices and Sperling's index.
 
-Accelerations are what accelerometers on a body's floor show: in the body's own axes, with the part of gravity that its
-and the track's roll and pitch bring in. A signal is weighted whole, before what is evaluated is cut out of it.
+Accelerations are those measured by accelerometers on a body's floor: in the axes of the body, with the component of
+gravity due to roll and pitch of the body and the track. The whole signal is weighted before the evaluated part is
+selected.
 
 Sources. Weightings Wk and Wd: table of ISO 8041 as an instrument's manual prints it (Larson Davis HVM200, table 3.1;
 read). Wb of EN 12299: two public codes that cite this standard and agree (pyridy; comfpy of tobias-bettinger), with
@@ -11,8 +12,8 @@ corners and gain but 0.55, 0.9, 0.95: Wb here is 13 % larger at 16 Hz and
 for comfort of the seated, crest factor, MTVV over 1 s, VDV); EN 12299:2009 (mean comfort N_MV = 6 sqrt(sum of the
 squares of the 95th percentiles of weighted rms values over 5 s)); Sperling and Betzhold (1956), Wz = 0.896 (a^3
 F(f)/f)^(1/10) of a sine of amplitude a in cm/s^2, in the form of Garg and Dukkipati (1984), (a B)^(3/10), whose squares
-add up over frequencies. The tests hold Wk and Wd against values of ISO 2631-1's table 3, recalled too, and Wz against
-the older form.
+add up over frequencies. The tests compare Wk and Wd with values of ISO 2631-1's table 3, also recalled, and Wz with the
+older form.
 """
 
 from typing import NamedTuple
@@ -26,12 +27,13 @@ from wrcore.geometry.path import track_frame
 from wrcore.run.motion import path_of
 from wrcore.vehicle.description import GRAVITY
 
-BLOCK = 5.0  # length of the stretches that comfort is evaluated over, s
-LEAST_RATE = 200.0  # weightings end at 100 Hz, 1/s
+BLOCK = 5.0  # length of the blocks over which comfort is evaluated, s
+LEAST_RATE = 200.0  # smallest output rate, 1/s: weightings end at 100 Hz
 
 
 class Weighting(NamedTuple):
-    """Corner frequencies (Hz) and qualities of a weighting's factors; without a step those of 5 and 6 are None."""
+    """Corner frequencies (Hz), quality factors and gain of a frequency weighting; ``f5`` to ``q6`` are None without a
+    step."""
 
     low: float
     high: float
@@ -45,7 +47,7 @@ class Weighting(NamedTuple):
     gain: float = 1.0
 
     def response(self, frequency):
-        """Complex response at frequencies (array_like, Hz)."""
+        """Return the complex response at frequencies (array_like, Hz)."""
         s = 1j * np.asarray(frequency, float)
 
         def pair(corner, quality):
@@ -60,12 +62,12 @@ class Weighting(NamedTuple):
 
 
 class Comfort(NamedTuple):
-    """Weighting B of Sperling's index: the filter without delay that has Garg and Dukkipati's B(f), times a factor."""
+    """Weighting B of Sperling's index: the minimum-phase filter with Garg and Dukkipati's B(f), times a factor."""
 
     factor: float
 
     def response(self, frequency):
-        """As of :class:`Weighting`."""
+        """Return the complex response at frequencies (array_like, Hz)."""
         s = 1j * np.asarray(frequency, float)
         return self.factor * s * (np.sqrt(1.911) + 0.25 * s) / (1.0 + s * (1.563 + s * (0.277 + s * 0.0368)))
 
@@ -77,50 +79,50 @@ WEIGHTINGS = {
     "B vertical": Comfort(0.588),
     "B lateral": Comfort(0.737),
 }
-"""By name: vertical and horizontal of ISO 2631-1, vertical of EN 12299, both of Sperling."""
+"""Weightings by name: vertical and horizontal of ISO 2631-1, vertical of EN 12299, vertical and lateral of Sperling."""
 
 DIRECTIONS = {"ax_m_per_s2": "Wd", "ay_m_per_s2": "Wd", "az_m_per_s2": "Wb"}
 """Weighting of each acceleration in EN 12299."""
 
-DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}  # the same in ISO 2631-1
+DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}  # weighting of each acceleration in ISO 2631-1
 
 SOURCES = {
     "EN 12299": "weightings and N_MV of public codes, Wz recalled",
     "ISO 2631": "weightings read, formulas recalled",
 }
-"""What each table stands on: no text of the standards was read."""
+"""Sources of each table: no text of the standards was read."""
 
 NEEDED = (*DIRECTIONS, "roll_rad", "pitch_rad", "yaw_rad")
-"""Channels of a body whose ride is evaluated; one that spins has no pitch."""
+"""Channels that the evaluation of a body's ride needs; spinning bodies have no pitch and are not evaluated."""
 
-RUNNING = 1.0  # time of the running rms of ISO 2631-1, s
+RUNNING = 1.0  # averaging time of the running rms of ISO 2631-1, s
 
 SETTLED = 1.0
-"""From this time after its start on a signal under Sperling's weighting has settled (slowest decay: 4 1/s), s."""
+"""Settling time of Sperling's weighting, s (slowest decay: 4 1/s)."""
 
 
 def weighted(values, rate, weighting):
-    """A signal (n,) of a rate (1/s) after one of the `WEIGHTINGS`, as if it had always been at its first value."""
+    """Apply one of the `WEIGHTINGS` to a signal (n,) with a rate (1/s), initially steady at its first value."""
     if weighting not in WEIGHTINGS:
         raise InputError("weighted", "weighting", one_of(WEIGHTINGS, weighting))
     values = np.asarray(values, float)
-    size = 2 * len(values)  # nothing comes back from the end
+    size = 2 * len(values)  # padding, so that the end does not wrap around to the beginning
     spectrum = np.fft.rfft(values - values[0], size) * WEIGHTINGS[weighting].response(np.fft.rfftfreq(size, 1.0 / rate))
     return np.fft.irfft(spectrum, size)[: len(values)]
 
 
 def block_rms(values, rate, block=BLOCK):
-    """Root mean squares of values (n,) of a rate (1/s) over each whole block (s)."""
+    """Return the root mean squares of values (n,) with a rate (1/s) over each complete block (s)."""
     length = round(block * rate)
     count = len(values) // length
     return np.sqrt(np.mean(np.square(np.asarray(values, float)[: count * length]).reshape(count, length), axis=1))
 
 
 def sperling(values, rate, vertical, late=True):
-    """Sperling's ride index Wz of an acceleration (n,), m/s^2, where ``late``: (sum of a^2 B^2)^(3/20), with the
-    amplitudes a of its parts in cm/s^2.
+    """Return Sperling's ride index Wz of an acceleration (n,), m/s^2, at the times ``late``: (sum of a^2 B^2)^(3/20),
+    with the amplitudes a of its frequency components in cm/s^2.
 
-    The sum is twice the mean square of the weighted signal, once that has settled. 3/20 is mostly rounded to 1/6.67.
+    The sum is twice the mean square of the weighted signal after settling. The literature mostly rounds 3/20 to 1/6.67.
     """
     felt = 100.0 * weighted(values, rate, "B vertical" if vertical else "B lateral")
     settled = np.arange(len(felt)) >= min(SETTLED * rate, len(felt) // 2)
@@ -128,8 +130,11 @@ def sperling(values, rate, vertical, late=True):
 
 
 def floor_accelerations(run, body):
-    """What accelerometers on a body's floor show at its centre of mass, in its axes (m/s^2, by the keys of
-    `DIRECTIONS`): nothing where it stands on level track. The body needs the channels `NEEDED`.
+    """Return accelerations that accelerometers on a body's floor measure at its centre of mass, in the axes of the
+    body.
+
+    They are in m/s^2, by the keys of `DIRECTIONS`, and zero at rest on level track. The body needs the channels
+    `NEEDED`.
     """
     from scipy.spatial.transform import Rotation
 
@@ -140,7 +145,7 @@ def floor_accelerations(run, body):
 
 
 def _upright(run, channels):
-    """The upright direction in the track's axes where a body is, shape (n, 3)."""
+    """Return the vertical direction in the axes of the track at a body's position, shape (n, 3)."""
     out, frame = np.tile([0.0, 0.0, 1.0], (len(run.t), 1)), np.empty((3, 3))
     if "s_m" in channels:
         path = path_of(run)
@@ -151,8 +156,10 @@ def _upright(run, channels):
 
 
 def ride_table(run, begin=0.0):
-    """Comfort of a run's bodies from ``begin`` (s) on, a row each: number of blocks, 95th percentiles of the weighted
-    accelerations over them (m/s^2), N_MV of EN 12299, Sperling's Wz lateral and vertical, and the source of all these.
+    """Return the comfort of a run's bodies from ``begin`` (s) on, with a row per body.
+
+    Columns are the number of blocks, 95th percentiles of the weighted accelerations over them (m/s^2), N_MV of EN
+    12299, Sperling's Wz lateral and vertical, and their source.
     """
     rate, late, bodies = _bodies(run, begin, BLOCK)
     rows = []
@@ -170,10 +177,12 @@ def ride_table(run, begin=0.0):
 
 
 def whole_body_table(run, begin=0.0):
-    """Whole-body vibration by ISO 2631-1 from ``begin`` (s) on, a row per body and direction x, y, z: weighting,
-    weighted rms (m/s^2), crest factor (largest weighted value over the rms), MTVV (largest running rms over 1 s,
-    m/s^2), VDV (fourth root of the integral of the fourth power, m/s^1.75), and the vibration total value of the body,
-    root of the sum of the squares of the rms (m/s^2), and the source of weightings and formulas.
+    """Return whole-body vibration by ISO 2631-1 from ``begin`` (s) on, with a row per body and direction x, y, z.
+
+    Columns are weighting, weighted rms (m/s^2), crest factor (largest weighted value over the rms), MTVV (largest
+    running rms over 1 s, m/s^2) and VDV (fourth root of the integral of the fourth power, m/s^1.75). The vibration
+    total value of the body is the root of the sum of the squares of the rms (m/s^2). ``source`` names that of
+    weightings and formulas.
     """
     rate, late, bodies = _bodies(run, begin, RUNNING)
     rows = []
@@ -196,7 +205,8 @@ def whole_body_table(run, begin=0.0):
 
 
 def _bodies(run, begin, least):
-    """Output rate, times that count, and the bodies without wheels that have poses and accelerations."""
+    """Return output rate (1/s), which output times are evaluated, and the bodies without wheels that have the channels
+    `NEEDED`."""
     rate, late = rate_of(run, LEAST_RATE, "ride"), output_times_after(run, begin, "ride")
     bodies = [group for group in run if group not in wheelsets_of(run) and set(NEEDED) <= set(run[group])]
     if not bodies:
@@ -207,7 +217,7 @@ def _bodies(run, begin, least):
 
 
 def rate_of(run, least, what):
-    """Output rate of a run, 1/s; one below ``least`` and times that are not equally spaced are refused."""
+    """Return the output rate of a run, 1/s; refuse a rate below ``least`` and times that are not equally spaced."""
     steps = np.diff(run.t)
     if len(steps) == 0 or np.ptp(steps) > 1e-6 * steps[0]:
         raise InputError(what, "run", "expected at least two output times, equally spaced")

@@ -1,4 +1,4 @@
-"""What a run says of its wheels: loads, guiding forces, wear, pressure.
+"""Wheel quantities of a run: wheel loads, guiding forces, wear numbers and contact pressure.
 
 Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.output.derived`.
 """
@@ -20,12 +20,12 @@ Side = Annotated[str, OneOf(SIDES)]
 
 
 def wheelsets_of(run):
-    """Names of a run's wheelsets, in the order of their groups."""
+    """Return the names of a run's wheelsets, in the order of their groups."""
     return [name for name in run.groups if f"{name}/left" in run.groups]
 
 
 def output_times_after(run, begin, what):
-    """Which output times of a run an evaluation that begins at a time (s) counts, shape (n,); others are refused."""
+    """Whether each output time of a run is at or after ``begin`` (s), shape (n,); refuse a begin outside the run."""
     if not len(run.t):
         raise InputError(what, "run", "expected output times, but it ended before the first")
     check_number(begin, min(0.0, run.t[0]), run.t[-1], what, "begin", "s")
@@ -33,15 +33,17 @@ def output_times_after(run, begin, what):
 
 
 def way_shares(run, wheelset, late):
-    """Shares of the way of a wheelset in the output times that count, shape (m,): weights of means per metre; at rest
-    those of time."""
+    """Return weights (m,) for means over the distance of a wheelset, at the output times where ``late`` is true.
+
+    At rest they are the weights of a mean over time.
+    """
     speed = np.broadcast_to(rolling_speed(run[wheelset], run.scene["speed"]), late.shape)[late]
     return speed / speed.sum() if speed.any() else np.full(speed.shape, 1.0 / speed.size)
 
 
 @checked
 def wheel_forces(run: Run, wheelset: str, side: Side) -> tuple[np.ndarray, np.ndarray]:
-    """Forces of a wheel on its rail.
+    """Return vertical and lateral forces of a wheel on its rail over time.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def wheel_forces(run: Run, wheelset: str, side: Side) -> tuple[np.ndarray, np.nd
 
 @checked
 def wear_number(run: Run, wheelset: str, side: Side, spin: bool = False) -> np.ndarray:
-    """Wear number T gamma of a wheel over time, without or with the spin's part.
+    """Return the wear number T gamma of a wheel over time, without or with the part of spin.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def wear_number(run: Run, wheelset: str, side: Side, spin: bool = False) -> np.n
     Returns
     -------
     numpy.ndarray, shape (n,)
-        N.
+        Wear number, N.
 
     Examples
     --------
@@ -96,9 +98,9 @@ def wear_number(run: Run, wheelset: str, side: Side, spin: bool = False) -> np.n
 
 @checked
 def creep_power(run: Run, wheelset: str, side: Side) -> np.ndarray:
-    """Power that a wheel's creep dissipates over time.
+    """Return the power dissipated by a wheel's creep over time.
 
-    Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
+    If a run has no velocities, the speed of the wheelset is the scene's speed.
 
     Parameters
     ----------
@@ -109,7 +111,7 @@ def creep_power(run: Run, wheelset: str, side: Side) -> np.ndarray:
     Returns
     -------
     numpy.ndarray, shape (n,)
-        W.
+        Power, W.
 
     Examples
     --------
@@ -123,13 +125,14 @@ def creep_power(run: Run, wheelset: str, side: Side) -> np.ndarray:
 
 
 def maximum_pressure(run, wheelset, side):
-    """Greatest pressure under a wheel over time, Pa, shape (n,), 0 without contact; of ellipses 3 N/(2 pi a b)."""
+    """Return the maximum pressure under a wheel over time, Pa, shape (n,), 0 without contact; 3 N/(2 pi a b) for
+    ellipses."""
     return np.max(np.nan_to_num(run[f"{wheelset}/{side}"].p_max_Pa), axis=1)
 
 
 @checked
 def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
-    """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.output.run.Run.wheel_forces`.
+    """Return forces, wear and pressure of a wheelset's wheels over time as a table.
 
     Parameters
     ----------
@@ -139,7 +142,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Index ``t_s``.
+        Index ``t_s``; columns: :meth:`wrcore.run.output.run.Run.wheel_forces`.
 
     Examples
     --------
@@ -165,7 +168,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
 
 @checked
 def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
-    """Loads, guiding forces and wear of each wheel.
+    """Return loads, guiding forces and wear of each wheel as a table.
 
     Parameters
     ----------
@@ -176,8 +179,8 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        A row per wheel: wheelset, side, mean, least and largest Q, mean Y (to the field side), largest |Y| (N), largest
-        |Y/Q|, mean wear numbers without and with spin (N, over the way) and mean creep power (W, over time).
+        A row per wheel: wheelset, side, mean, smallest and largest Q, mean Y (to the field side), largest |Y| (N),
+        largest |Y/Q|, mean wear numbers without and with spin (N, over distance) and mean creep power (W, over time).
 
     Examples
     --------
