@@ -1,1 +1,1 @@
-"""Contact in single poses."""
+"""Contact of a wheelset at single positions and attitudes, outside a simulation."""

@@ -1,4 +1,4 @@
-"""Contact of a wheelset over its lateral position and yaw, without load: points, angles, radii, conicity."""
+"""Table of the contact patches of a wheelset over its lateral position and yaw."""
 
 from typing import Annotated
 
@@ -23,7 +23,7 @@ def contact_table(
     detection: Annotated[str, OneOf(("planar", "spatial"))] = "spatial",
     patch: Annotated[str, OneOf(REDUCTIONS)] = "moment",
 ) -> pd.DataFrame:
-    """Contact of a wheelset over its lateral position and yaw: all patches of both wheels at a load per wheel.
+    """Return all contact patches of both wheels over lateral position and yaw of a wheelset, at a load per wheel.
 
     Parameters
     ----------
@@ -31,20 +31,20 @@ def contact_table(
     shifts, yaws : array_like
         Lateral positions (within 0.1 m) and yaw angles (within 0.5 rad) of the wheelset; all combinations.
     wheel_load : float
-        Vertical load of each wheel, N; the default is a wheelset that just touches.
+        Vertical load of each wheel, N; with the default the wheelset just touches the rails.
     detection : {"planar", "spatial"}
     patch : {"moment", "maximum"}
 
     Returns
     -------
     pandas.DataFrame
-        y_m, yaw_rad and the columns of ``wrcore contact``, a row per patch; a wheel that touches nothing, or that no
-        height loads, has none.
+        y_m, yaw_rad and the columns of ``wrcore contact``, a row per patch. A wheel without contact, or without a
+        height at which it carries the load, has no row.
 
     Raises
     ------
     InputError
-        For a pose out of these bounds, an unknown choice, or a load in another unit.
+        If a position or angle is out of these bounds, a choice is unknown, or a load has another unit.
 
     Examples
     --------
@@ -66,5 +66,5 @@ def contact_table(
 
 
 def _of_patches(flag, there):
-    """A flag of poses (n,), wheels (n, 2) or patches (n, 2, 3) in the dimensions of patches."""
+    """Reshape a flag of positions (n,), wheels (n, 2) or patches (n, 2, 3), so that it broadcasts to patches."""
     return flag.reshape(flag.shape + (1,) * (there.ndim - flag.ndim))

@@ -1,4 +1,4 @@
-"""Contacts of a wheelset in many poses at once: arrays in, arrays out."""
+"""Compute contacts of a wheelset at many positions and attitudes at once, from arrays."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from wrcore.wheels.hertzian_force import wheel_wrenches
 from wrcore.wheels.motion import MOTION as _MOTION
 
 MOTION: Any = _MOTION  # columns of motions
-OUT_OF_REACH = 1.0  # a wheelset that is lifted so much touches nothing, m
+OUT_OF_REACH = 1.0  # lift of a wheelset that removes all contact, m
 
 
 @lru_cache(maxsize=8)
 def _wheels(side: WheelOnRail, patch: str, detection: str) -> LoadedWheels:
-    """What all poses of a wheel on its rail share; only what never changes is taken of it."""
+    """Return the cached `LoadedWheels` of a wheel on its rail, of which callers use only constant parts."""
     return LoadedWheels(side.geometry, patch, detection=detection)
 
 
@@ -51,44 +51,44 @@ def contacts(
     detection: Annotated[str, OneOf(("planar", "spatial"))] = "spatial",
     patch: Annotated[str, OneOf(REDUCTIONS)] = "moment",
 ) -> Channels:
-    """Contacts of a wheelset in given poses, at rest or rolling; numbers and arrays broadcast to the shape ``(...)``.
+    """Return contacts of a wheelset at given positions, at rest or rolling; arguments broadcast to the shape ``(...)``.
 
     Parameters
     ----------
     pair : WheelsetOnTrack
     y, z, roll, yaw : array_like
-        Poses of the wheelset's centre, m and rad; roll first, then yaw about the vertical. z given: at that height
-        (roll left out: 0). Roll given, z not: each wheel at the height at which it carries ``load``. Neither: both
-        wheels carry it.
+        Position and attitude of the wheelset's centre, m and rad; roll first, then yaw about the vertical. If z is
+        given, the wheelset is at that height (default roll: 0). If only roll is given, each wheel is at the height at
+        which it carries ``load``. If neither is given, roll and height are those at which both wheels carry it.
     load : array_like, optional
-        Vertical load of a wheel at rest, N, where z is not given.
+        Vertical load of a wheel at rest, N, if z is not given.
     speed : array_like, optional
-        Along the track, m/s; left out: the wheelset stands, and there is no creep.
+        Speed along the track, m/s; by default the wheelset is at rest, and there is no creep.
     omega : array_like, optional
-        Rate of rolling, rad/s, positive forward; left out: for each wheel that of its free rolling.
+        Rate of rolling, rad/s, positive forward; by default that of free rolling of each wheel.
     vy, yaw_rate, mu : array_like
         Lateral velocity (m/s), yaw rate (rad/s), coefficient of friction.
     detection : {"planar", "spatial"}
     patch : {"moment", "maximum"}
-        How an overlap becomes an ellipse; creep forces are those of the creep table for Poisson's ratio 0.28, and
-        the shear modulus 82 GPa.
+        Method that fits an ellipse to an overlap. Creep forces are those of the creep table for Poisson's ratio 0.28
+        and the shear modulus 82 GPa.
 
     Returns
     -------
     Channels
-        Those of a run's contacts by name (``N_N``, ``y_m``, ``contact_angle_rad``, ``Fx_N`` and so on) and
+        Channels of a run's contacts by name (``N_N``, ``y_m``, ``contact_angle_rad``, ``Fx_N`` and so on) and
         ``p_max_Pa``, each of shape ``(..., 2, 3)``: left and right wheel, patches from the flange to the field side,
-        NaN where there is none. ``roll_rad``, shape ``(...)``, and ``z_wheelset_m``, shape ``(..., 2)``, by wheel: NaN
-        where no height gives the load. ``load_residual_N``, shape ``(..., 2)``: carried less asked load of each wheel,
-        NaN where z is given. Flags, 0 or 1: ``not_loaded``, shape ``(..., 2)``, where a wheel does not carry its load;
+        NaN where absent. ``roll_rad``, shape ``(...)``, and ``z_wheelset_m``, shape ``(..., 2)``, by wheel: NaN if
+        there is no height for the load. ``load_residual_N``, shape ``(..., 2)``: carried minus required load of each
+        wheel, NaN if z is given. Flags are 0 or 1. ``not_loaded``, shape ``(..., 2)``: a wheel does not carry its load.
         ``half_space``, ``conformal``, ``profile_edge`` and ``hollow_ahead`` of patches, and ``search_fallback`` and
-        ``both_flanges``, shape ``(...)``, where a limit of validity is exceeded that a run counts by this name.
+        ``both_flanges``, shape ``(...)``: a limit of validity is exceeded, which a run counts by the same name.
 
     Raises
     ------
     InputError
-        For arrays that do not broadcast, a number in another unit, neither z nor load, or a z at which a wheel lies
-        deeper than 1 mm in its rail.
+        If arrays do not broadcast, a number has another unit, neither z nor load is given, or a wheel penetrates its
+        rail by more than 1 mm at the given z.
 
     Examples
     --------
@@ -111,12 +111,12 @@ def contacts(
     whole = same_shape("contacts", **{key: np.nan if value is None else value for key, value in given.items()})
     sides = [_wheels(getattr(pair, name), patch, detection) for name in SIDES]
     found = _found(sides, *(np.array(one, float).ravel() for one in whole))
-    shape = whole[0].shape  # instead of (n,)
+    shape = whole[0].shape  # results have this shape instead of (n,)
     return Channels("contacts", {name: values.reshape((*shape, *values.shape[1:])) for name, values in found.items()})
 
 
 def _found(sides, y, z, roll, yaw, load, speed, omega, vy, yaw_rate, mu):
-    """Channels of n poses, by name; NaN is what was not given."""
+    """Return channels of n positions, by name; NaN marks arguments that were not given."""
     roll, heights = _placed(sides, y, yaw, z, roll, load)
     motions, rolls = np.zeros((len(y), 2, len(MOTION))), not np.isnan(speed).any()
     axle = np.array([axle_direction(*angles) for angles in zip(roll, yaw, strict=True)]).reshape(-1, 1, 3)
@@ -139,13 +139,15 @@ def _found(sides, y, z, roll, yaw, load, speed, omega, vy, yaw_rate, mu):
 
 
 def _limits(sides, rows, roll, yaw):
-    """Flags of :func:`wrcore.run.checks.validity.flags` of n poses with patches (n, 2, MAX_PATCHES, PATCH_COLUMNS)."""
+    """Return flags of :func:`wrcore.run.checks.validity.flags` of n positions from patches ``rows``
+    (n, 2, MAX_PATCHES, PATCH_COLUMNS)."""
     contact = sides[0]._still._replace(geometries=tuple(one.geometry for one in sides))
     return {name: one[:, 0] for name, one in flags(contact, rows[:, None], roll[:, None], yaw[:, None]).items()}
 
 
 def _placed(sides, y, yaw, z, roll, load):
-    """Roll (n,) and heights (n, 2) of the wheelset: given, or those of its balance."""
+    """Return roll (n,), rad, and heights (n, 2), m, of the wheelset: given ones, or those at which it carries the
+    load."""
     if not np.isnan(z).any():
         return np.where(np.isnan(roll), 0.0, roll), np.stack([z, z], axis=-1)
     heights, scratch = np.full((len(y), 2), np.nan), np.empty((MAX_PATCHES, PATCH_COLUMNS))
@@ -164,7 +166,7 @@ def _placed(sides, y, yaw, z, roll, load):
 
 
 def _refuse_deep(sides, motions):
-    """InputError where a wheel lies deep in its rail."""
+    """Raise InputError if a wheel penetrates its rail by more than `DEEPEST`."""
     lifted = motions.copy()
     lifted[..., MOTION.z] += DEEPEST
     radii = np.array([one.geometry.rolling_radius for one in sides])
@@ -177,7 +179,10 @@ def _refuse_deep(sides, motions):
 
 
 def _set_rolling(sides, motions, axle, speed, omega, vy, yaw_rate):
-    """Set the velocities of wheels that roll, freely where no rate is given: the slip is linear in it."""
+    """Set the velocities of rolling wheels in ``motions``; without a rate of rolling, that of free rolling is computed.
+
+    The longitudinal slip is linear in this rate, so two evaluations determine it.
+    """
     motions[..., MOTION.vx], motions[..., MOTION.vy] = speed[:, None], vy[:, None]
 
     def turned(rates):  # (n, 2)
@@ -197,7 +202,7 @@ def _set_rolling(sides, motions, axle, speed, omega, vy, yaw_rate):
 
 
 def _pressed(sides, motions, with_creep):
-    """Patches (n, 2, MAX_PATCHES, PATCH_COLUMNS) of wheels in motion, NaN where there are none."""
+    """Return patches (n, 2, MAX_PATCHES, PATCH_COLUMNS) of wheels with given motions, NaN where absent."""
     count = len(motions)
     out = np.full((count, 2, MAX_PATCHES, PATCH_COLUMNS), np.nan)
     for wheel in (slice(0, 2),) if sides[0] is sides[1] else (0, 1):

@@ -1,9 +1,9 @@
-"""Exact contact at the output times of a run, whatever its own patches were: ``wr.patch_in_run``.
+"""Exact contact patches at the output times of a run with any patch model: ``wr.patch_in_run``.
 
-Where a wheel lay on its rail and how it moved there are the channels ``wheel_motion``; of the run's contact the wheel
-keeps the vertical force: it is raised or lowered until its exact patches carry that, or nearly that where their force
-steps. That holds of exact runs, too: with a damping factor their contact is softer than the material, and the wheel lay
-deeper.
+Position and velocity of a wheel relative to its rail are the channels ``wheel_motion``. The vertical force of the run
+is kept: the height of the wheel is changed until its exact patches carry this force, or nearly this force at a jump of
+the force. This also applies to runs with exact patches: with a damping factor their contact is softer than the
+material, and the penetration in the run is larger.
 """
 
 from __future__ import annotations
@@ -29,26 +29,27 @@ from wrcore.scene.description import Scene, Source, friction_of, scene_of
 from wrcore.wheels.motion import WheelMotion
 
 PARTS = "vehicle", "wheel", "rail", "track", "contact"
-"""Of a scene, on which contact hangs."""
+"""Parts of a scene on which contact depends."""
 
 CARRIED = 1e-3
-"""Relative error of F^(2/3) that ends the search for a height."""
+"""Relative error of F^(2/3) at which the search for a height ends."""
 
 NEAR = 2e-8
-"""Heights that differ by less (m) end it, too: there the force steps, by less than strips err."""
+"""Difference of successive heights, m, at which the search ends, too: the force has a jump there, which is smaller than
+the error of strips."""
 
 SAID = 1e-2
-"""Share by which the force of patches may be off without a word."""
+"""Relative error of the patches' vertical force above which wrcore warns."""
 
 ROUNDING = 1e-9
-"""Of times, s."""
+"""Tolerance of times for rounding errors, s."""
 
 
 class WheelInRun:
-    """A wheel of a run of a scene, solved exactly at its output times; ``asker`` is named in errors. ``steps``: as of
-    `LoadedWheels`.
+    """A wheel of a run of a scene, whose exact patches are solved at output times.
 
-    An InputError where the run has no ``wheel_motion``, or rails or wheels that change along the track or the rim.
+    Errors name ``asker``; ``steps`` is that of `LoadedWheels`. InputError if the run has no ``wheel_motion``, or if
+    rails or wheels vary along the track or the circumference.
     """
 
     def __init__(self, run: Run, scene: Scene, wheelset: str, side: str, resolution: str, asker: str,
@@ -71,16 +72,16 @@ class WheelInRun:
         normal, lateral, angle = rows
         self._loads = np.nansum(normal * np.cos(angle) + lateral * np.sin(angle), axis=1)
         self._presses = np.nansum(normal, axis=1) > 0.0
-        self.missed = 0.0  # by the patches found last: what they lack or have too much, as a share of the force
+        self.missed = 0.0  # relative error of the vertical force of the patches found last
 
     def at(self, i: int) -> list[Found]:
-        """Patches, with their fields, at the i-th output time; none where the wheel is in the air."""
+        """Return patches with their fields at the i-th output time; empty if the wheel has no contact."""
         self.missed = 0.0
         if not self._presses[i]:
             return []
         m, load, self.missed = WheelMotion(*self._motions[i].tolist()), float(self._loads[i]), np.inf
         goal, before, best = max(load, 0.0) ** (2.0 / 3.0), np.nan, []
-        first = self._wheels.in_motion(m._replace(friction=0.0))  # what follows is warm: forces without steps
+        first = self._wheels.in_motion(m._replace(friction=0.0))  # start of later ones
 
         def excess(z):
             nonlocal before, best
@@ -97,12 +98,12 @@ class WheelInRun:
         return best or self._carrying(m)
 
     def _carrying(self, m: WheelMotion) -> list[Found]:
-        """Patches, with their fields, without those that barely touch: a grid may have no element in contact."""
+        """Return patches with their fields, without patches of zero load: a grid may have no element in contact."""
         return [one for one in self._wheels.in_motion(m, fields=True, warm=True) if one.load > 0.0]
 
 
 def _lift(found: list[Found], load: float) -> float:
-    """By what a wheel is to be lifted, m, so that its patches carry a load, N, if its force goes with depth^1.5."""
+    """Return the lift of a wheel, m, at which its patches carry a load, N, if force is proportional to depth^1.5."""
     most = max(found, key=lambda one: one.load, default=None)
     if most is None or not most.load > 0.0:
         return 0.0
@@ -111,7 +112,7 @@ def _lift(found: list[Found], load: float) -> float:
 
 
 def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:
-    """An InputError, of an asker's field, for a scene whose rails or wheels change along the track or the rim."""
+    """Raise InputError, named by ``asker`` and ``field``, if rails or wheels of a scene vary along track or rim."""
     parts = {"track.crossing": scene.crossings, "out_of_round": scene.out_of_round, "corrugation": scene.corrugation}
     if changing := [name for name, part in parts.items() if part]:
         expected = f"expected rails and wheels that are the same everywhere for exact patches, got {changing[0]}"
@@ -120,7 +121,8 @@ def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:
 
 
 def scene_in_run(run: Run, scene: Source | None, asker: str, trust: bool) -> Scene:
-    """The scene of a run; an InputError in the name of the ``asker`` for one that differs in what contact hangs on."""
+    """Return the scene of a run; InputError, named by ``asker``, if parts on which contact depends differ from the
+    run's."""
     scene = scene_of(run, scene, asker, trust)
     other = [part for part in PARTS if scene.data.get(part) != run.scene.get(part)]
     if other:
@@ -133,7 +135,7 @@ def scene_in_run(run: Run, scene: Source | None, asker: str, trust: bool) -> Sce
 
 
 def check_laws(run: Run, scene: Scene, asker: str) -> None:
-    """An InputError in the name of the ``asker`` where laws of a run's scene are others than those that it ran with."""
+    """Raise InputError, named by ``asker``, if the user's laws of a run's scene have changed after the run."""
     then, now = run.settings.get("laws_sha256", {}), scene.laws.digests
     changed = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
     if changed:
@@ -151,36 +153,37 @@ def patch_in_run(
     scene: Source | None = None,
     trust: bool = False,
 ) -> list[Patch]:
-    """Exact contact patches of a wheel at a time of a run, whatever patches the run itself went by.
+    """Return the exact contact patches of a wheel at a time of a run with any patch model.
 
     Parameters
     ----------
     run : Run
-        Of a scene whose ``output.channels`` ask for ``contact`` and ``wheel_motion``.
+        Run of a scene whose ``output.channels`` contain ``contact`` and ``wheel_motion``.
     t : float
-        Time, s; the nearest output time counts.
+        Time, s; the nearest output time is used.
     wheelset : str
         Name of a wheelset.
     side : {"left", "right"}
     resolution : {"coarse", "middle", "fine"}
     scene : Scene, str, Path or dict, optional
-        That of the run; left out: read anew by what the run says of it.
+        Scene of the run; by default it is read again from the description in the run.
     trust : bool
-        Whether laws of the user that a run file names may be run.
+        Whether laws of the user that a run file names may be executed.
 
     Returns
     -------
     list of Patch
-        From the flange to the field side; empty where the wheel is in the air. Together they carry the vertical force
-        that the wheel had in the run, at its place and motion on its rail, but for its height; next to it where their
-        force steps over it.
+        Patches from the flange to the field side; empty if the wheel has no contact. Together they carry the vertical
+        force of the wheel in the run, or a force close to it at a jump. Position and velocity are those of the run,
+        except the height.
 
     Raises
     ------
     InputError
-        For a time beyond the run, a wheel that it does not have, missing channels, another scene than the run's, and
-        rails or wheels that change along the track or the rim: of these a run counts patches that are no parabola
-        along the rail (``not_parabolic``), and ``wrcore contact --patch grid`` on slices takes the real surfaces.
+        If the time is outside the run, the run does not have the wheel or the channels, or the scene is not the run's.
+        Also if rails or wheels vary along the track or the rim. For these, a run counts patches whose gap along the
+        rail is not a parabola (``not_parabolic``), and ``wrcore contact --patch grid`` on slices uses the real
+        surfaces.
 
     Examples
     --------

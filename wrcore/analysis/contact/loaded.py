@@ -1,8 +1,9 @@
-"""A loaded wheel on its rail, at a height or under a load: the contact of a run in a given pose and motion.
+"""Contact of a loaded wheel on its rail at a given height or load, by the kernels of runs, for a given position and
+velocity.
 
-A wheelset rolls with the speed V along the track and omega about its axle, moves sideways and turns; all of it is
-optional. Without a motion a patch carries its normal force alone. Without omega the wheel rolls freely: the mean of its
-longitudinal rigid slip over the pressure of all its patches vanishes.
+A wheelset rolls with the speed V along the track and omega about its axle, with optional lateral velocity and yaw rate.
+Without a motion a patch has only a normal force. Without omega the wheel rolls freely: the mean of its longitudinal
+rigid slip, weighted by the pressure of all its patches, is zero.
 """
 
 import math
@@ -46,12 +47,12 @@ MODELS = (*PATCHES, "grid")
 GRIDS = {"coarse": ((32, 24),), "middle": ((32, 24), (40, 32)), "fine": FINE}
 """Grids of each resolution (elements along x, across)."""
 
-DEEPEST = 1e-3  # overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread
-LOWEST = 0.1  # a wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot
-SMOOTH = 1e-9  # coefficient of friction where the normal forces alone are looked at
-SLOWEST = 1e-9  # creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at
-_CARRIED = 1e-9  # relative error of F^(2/3) that ends the search for a height
-_LEVEL = 1e-10  # step in roll that ends the search for it, rad
+DEEPEST = 1e-3  # largest overlap at a given height, m; the maximum load, 1 MN, causes 0.35 mm on a tread
+LOWEST = 0.1  # largest distance of a wheelset below its rolling radius, m: lower, flanges stand on the rail's foot
+SMOOTH = 1e-9  # coefficient of friction if only normal forces are needed
+SLOWEST = 1e-9  # smallest speed by which creepages are divided, m/s: smaller than any speed that users can give
+_CARRIED = 1e-9  # relative error of F^(2/3) at which the search for a height ends
+_LEVEL = 1e-10  # step in roll at which the search for roll ends, rad
 
 _MOST_ROLLS = 25
 
@@ -67,51 +68,52 @@ class Rolling(NamedTuple):
     yaw_rate: float = 0.0
 
     def motion(self, roll, yaw, rate):
-        """`Motion` of a wheelset in a pose at a rate of rolling."""
+        """Return the `Motion` of a wheelset with a roll, a yaw (rad) and a rate of rolling (rad/s)."""
         wx, wy, wz = (rate * c for c in axle_direction(roll, yaw))
         return Motion(self.speed, self.vy, 0.0, wx, wy, wz + self.yaw_rate, self.speed)
 
 
 class Found(NamedTuple):
-    """One patch of a wheel."""
+    """One contact patch of a wheel."""
 
     row: np.ndarray
-    """(PATCH_COLUMNS,) as in runs; creepages are NaN without a motion."""
+    """Columns of the patch, shape (PATCH_COLUMNS,), as in runs; creepages are NaN without a motion."""
     extent: tuple
     """x_min, x_max (from the wheelset's cross-section) and width in the contact plane, m."""
     load: float
     slip: float
-    """Force of the pressure, N, and mean of the longitudinal rigid slip over it."""
+    """Normal force of the pressure (``load``), N, and mean of the longitudinal rigid slip weighted by the pressure."""
     patch: Patch = None
-    """With its fields, where the model has them and they were asked for."""
+    """Patch with its fields, if the model has fields and they were requested."""
     places: np.ndarray = None
-    """(2, 2, strips): both ends of its strips on the wheel's and on the rail's profile, m."""
+    """Both ends of its strips on the profiles of wheel and rail, shape (2, 2, strips), m."""
     on_grid: bool = False
     on_fixed: bool = False
-    """Whether a grid, or fixed strips, stood in."""
+    """Whether a grid (``on_grid``) or fixed strips (``on_fixed``) were used instead of strips."""
 
     @property
     def vertical(self):
-        """Force upwards on the wheel, N."""
+        """Vertical force on the wheel, upwards positive, N."""
         angle = self.row[columns.ANGLE]
         return self.row[columns.NORMAL] * math.cos(angle) + self.row[columns.FY] * math.sin(angle)
 
 
 def carried(found, vertical=True):
-    """Load of a wheel, N, from its patches (`Found`): the vertical sum of all forces, or that of the normal forces."""
+    """Return the load of a wheel, N, from its patches (`Found`): the vertical component of all forces, or the sum of
+    normal forces."""
     return sum(one.vertical if vertical else one.row[columns.NORMAL] for one in found)
 
 
 class LoadedWheels:
-    """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
+    """Loaded wheels of a wheelset with one patch model: a model of runs, or ``grid``, their reference.
 
     Strips and grids have a ``resolution`` (coarse, middle, fine) and a rigid ``slip`` (of the real surfaces, or one set
-    of creepages); where strips find no solution a grid takes over. Windows are sought for so many ``steps``, then fixed
-    strips stand in. They may have ``more`` of a `ContactModel`.
+    of creepages). If strips find no solution, a grid is used. The search for contact windows takes at most ``steps``
+    steps, then fixed strips are used. ``more`` are further fields of a `ContactModel`.
     """
 
     refines = True
-    """Whether a patch that strips do not solve is solved anew on finer grids."""
+    """Whether a patch without a solution on strips is solved again on finer grids."""
 
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
                  poisson_ratio=0.28, detection="spatial", steps=STEPS, **more):  # fmt: skip
@@ -146,12 +148,14 @@ class LoadedWheels:
 
     @property
     def contact(self):
-        """Its `ContactModel`, of wheels at rest."""
+        """`ContactModel` of wheels at rest."""
         return self._still
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
-        """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),
-        roll, then yaw about the vertical (rad); without ``rolling`` it stands and there are no creep forces.
+        """Return patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel.
+
+        The wheelset is at y, z (m), with roll, then yaw about the vertical (rad). Without ``rolling`` it is at rest and
+        there are no creep forces.
         """
         pose, motion, contact = (side, y, z, roll, yaw), None, self._still_handle
         if rolling is not None:
@@ -166,14 +170,18 @@ class LoadedWheels:
         return found
 
     def in_motion(self, m, fields=False, warm=False):
-        """The same of a wheel in the `WheelMotion` of a run, for strips; if ``warm`` from their last solutions so."""
+        """Return patches of a wheel with the `WheelMotion` of a run, for models with strips; if ``warm``, the solver
+        starts from the last solutions."""
         side, motion = SIDES_BY_SIGN[m.side], Motion(*m[MOTION.vx : MOTION.wz + 1], abs(m.vx))
         pose = side, m.y, m.z, math.asin(m.ez), math.atan2(-m.ex, m.ey)
         return list(self._on_strips(self._still_handle, as_left(m), pose, motion, m.friction, fields, warm))
 
     def _at_work(self, looked_up=0.0):
-        """The contact that rolls: exact, by the creep table, or looked up in a pair's table for a coefficient of
-        friction."""
+        """Return the handle of the contact model of rolling wheels.
+
+        It is exact, with the creep table for ellipses, or uses a pair's lookup table for the coefficient of friction
+        ``looked_up`` (0: no lookup table).
+        """
         if looked_up not in self._rolling:
             contact = self._still
             if looked_up or self.is_elliptic:
@@ -184,7 +192,7 @@ class LoadedWheels:
         return self._rolling[looked_up]
 
     def _free_rate(self, pose, rolling):
-        """The rate of rolling, or where none is given that of free rolling: the slip is linear in it."""
+        """Return the rate of rolling, rad/s; by default that of free rolling, as slip is linear in the rate."""
         if not math.isnan(rolling.rate):
             return rolling.rate
         usual, means = rolling.speed / self.geometry.rolling_radius, []
@@ -195,7 +203,8 @@ class LoadedWheels:
         return usual + 1e-3 * usual * means[0] / (means[0] - means[1]) if means[0] != means[1] else usual
 
     def _patches(self, contact, pose, motion, friction, fields):
-        """`Found` of each patch by the kernels of runs; without fields (None) not even on grids of this class."""
+        """Yield `Found` of each patch by the kernels of runs; if ``fields`` is None, grids of this class are not
+        used."""
         side, y, z, roll, yaw = pose
         velocity = motion[:6] if motion else (0.0,) * 6
         m = WheelMotion(*map(float, (SIDES[side], y, z, *axle_direction(roll, yaw), *velocity, 0.0, 0.0, friction)))
@@ -215,7 +224,8 @@ class LoadedWheels:
             yield Found(one, (x - a, x + a, 2.0 * b), float(one[columns.NORMAL]), float(one[columns.XI]))
 
     def _on_strips(self, contact, left, pose, motion, friction, fields, warm=False):
-        """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
+        """Yield `Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left
+        wheel."""
         sign, work, overlaps = SIDES[pose[0]], self._work, self._rows
         if not fields and (motion is None or fields is None):
             left = left._replace(friction=0.0)  # without friction no rolling problem is solved
@@ -254,12 +264,12 @@ class LoadedWheels:
             first, group = last, group + 1
 
     def _is_rough(self, which, left, first, last, on_grid):
-        """Whether a patch (side, number) is to be solved on grids though strips, or a grid, have solved it."""
+        """Whether a patch (side, number) is to be solved on grids although strips, or a grid, have a solution."""
         return False
 
     def _fields(self, row, load, pose, friction, back):
-        """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid; a wheel that rolls
-        ``back`` was solved turned round."""
+        """Return the `Patch` of the strips solved last, with their panels as cells, relative to the centroid of
+        pressure; a wheel that rolls ``back`` was solved with the direction of travel reversed."""
         turn = -1.0 if back else 1.0
         work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
         count, slender, _ = work.solved
@@ -269,7 +279,7 @@ class LoadedWheels:
         tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
         rows = (solve.CENTRE, solve.OWN_WIDTH, solve.HALF_LENGTH, solve.MIDDLE, solve.WINDOW)
         centre, width, half, middle, window = work.strips[list(rows), :count]
-        even = solve.even_length(half, width, window)  # strips as rectangles with the areas they have
+        even = solve.even_length(half, width, window)  # strips as rectangles of equal area
         longer = load / work.sums[solve.LOAD] * (half / even)[:, None]
         edges = middle[:, None] + turn * even[:, None] * library.panels.edges
         like, mean_x, mean_s = np.ones(pressure.shape), work.sums[solve.MEAN_X], work.sums[solve.MEAN_S]
@@ -289,7 +299,7 @@ class LoadedWheels:
         )  # fmt: skip
 
     def _places(self):
-        """`Found.places` of the strips solved last: their places are those of their middles, the ends lie between."""
+        """Return `Found.places` of the strips solved last; the ends are interpolated between the strips' middles."""
         count = self._work.solved[0]
         centre, width = self._work.strips[:2, :count]
         known = np.r_[centre[0] - width[0], centre, centre[-1] + width[-1]]
@@ -301,7 +311,7 @@ class LoadedWheels:
         return np.array(found)
 
     def _on_grid(self, row, left, first, last, pose, motion, friction):
-        """`Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""
+        """Return `Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""
         side, y, z, roll, yaw = pose
         if left.vx < 0.0:
             raise InputError("contact", "motion", "expected a wheel that rolls ahead where strips find no solution")
@@ -312,7 +322,7 @@ class LoadedWheels:
         rigid, (cosine, sine) = (0.0, 0.0, 0.0), (math.cos(angle), math.sin(angle))
         if motion is not None and self.surfaces:
             rigid = motion
-        elif motion is not None:  # of the undeformed wheel's material point above the frame's origin
+        elif motion is not None:  # at the undeformed wheel's material point above the frame's origin
             place = origin[0], origin[1] + depth * sine - y, origin[2] - depth * cosine - z
             rigid = creepages(*motion[:6], *place, cosine, sine, motion.speed)[:3]
         axle = (sign * c for c in axle_direction(roll, yaw))
@@ -335,9 +345,10 @@ class LoadedWheels:
         return Found(row, extent, patch.normal, math.nan, patch, on_grid=True)
 
     def placed(self, sides, y, yaw, known, load, how, told):
-        """Roll, and height of the wheelset by side, in a pose: what is NaN of ``known``, its roll and z, is sought for
-        the load as `loaded_poses` says, with arguments ``how`` of `height`. A height at which a wheel lies deeper in
-        its rail than `DEEPEST` is refused; ``told``: source and field.
+        """Return roll (rad), and height of the wheelset (m) by side.
+
+        Of ``known``, its roll and z, NaN values are computed for the load (see `loaded_poses`), with arguments ``how``
+        of `height`. InputError (source and field ``told``) if a wheel penetrates its rail by more than `DEEPEST`.
         """
         roll, z = known
         if math.isnan(z) and math.isnan(roll):
@@ -355,11 +366,11 @@ class LoadedWheels:
         return roll, dict.fromkeys(sides, z)
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
-        """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal
-        forces), sought near ``guess`` (m); NaN where there is none.
+        """Return the height z (m) of the wheelset at which one wheel carries a load (N), searched near ``guess`` (m);
+        NaN if there is none. The load is the vertical component of all forces, or the sum of the normal forces.
         """
         goal = load ** (2.0 / 3.0)
-        solved = self.is_elliptic and rolling is None and vertical  # by Hertz's law at rest
+        solved = self.is_elliptic and rolling is None and vertical  # Hertz's law at rest needs no search
 
         def excess(z):
             force = carried(self.at_height(side, y, z, roll, yaw, rolling, friction), vertical)
@@ -374,7 +385,8 @@ class LoadedWheels:
         return guess if math.isnan(guess) or solved else height_of_zero(excess, guess)
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
-        """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
+        """Return roll (rad) and height (m) at which each wheel carries a load, NaN if there are none; arguments are
+        those of `height`."""
         roll, z = settle(self.geometry, self.geometry, self._still.hertz, self.modulus, y, yaw, self.spatial,
                          self._still.reduction, load, self.geometry.rolling_radius)  # fmt: skip
         if math.isnan(z) or (self.is_elliptic and rolling is None and vertical):
@@ -382,7 +394,8 @@ class LoadedWheels:
         return self._levelled(roll, z, y, load, yaw, rolling, friction, vertical)
 
     def _levelled(self, roll, z, y, load, yaw, rolling, friction, vertical):
-        """Roll (rad) and height (m) at which each wheel carries a load, from guesses."""
+        """Compute roll (rad) and height (m) at which each wheel carries a load by a secant method, from initial
+        guesses."""
         before = difference = math.nan
         slope, left, right = ROLL_SLOPE, z, z
         for _ in range(_MOST_ROLLS):
@@ -397,7 +410,7 @@ class LoadedWheels:
             if abs(step) < _LEVEL:
                 if abs(difference) < _LEVEL:
                     return roll, 0.5 * (left + right)
-                slope = ROLL_SLOPE  # a height has jumped: the slope was that of the jump
+                slope = ROLL_SLOPE  # a height has jumped, and the slope is that of the jump
                 step = difference / slope
             roll -= step
             left, right = left - 0.5 * slope * step, right + 0.5 * slope * step

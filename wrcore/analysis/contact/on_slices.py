@@ -1,4 +1,4 @@
-"""A loaded wheel on a rail of slices, or a wheel out of round: crossings, switches, joints, flats."""
+"""Contact of a loaded wheel on a rail of slices, or of a wheel out of round: crossings, switches, joints, flats."""
 
 import math
 
@@ -15,24 +15,24 @@ from wrcore.run.checks.shape_along import ROUGH
 from wrcore.wheels.contact_model import ON_FIXED, ON_GRID
 
 MODELS = ("maximum", "moment", "exact", "grid")
-"""Patch models that serve rails which change along the track."""
+"""Patch models for rails that vary along the track."""
 
 FINER = (2.0, 1.75, 1.5, 1.0, 0.75)
-"""Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them. Where no solution is
-found with the first number, the next ones are tried."""
+"""Numbers of strips of a window, relative to those on ordinary rails: slender patches on sharp edges of heads need more
+strips. If the first number gives no solution, the next ones are tried."""
 
-_STATIONS = 81  # over the length of a patch
+_STATIONS = 81  # number of points over the length of a patch
 
 _SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
 
 
 class LoadedOnSlices(LoadedWheels):
-    """`LoadedWheels` out of round or on rails of slices, both alike: of a `WheelOnSlices`; arguments as there.
+    """`LoadedWheels` out of round or on rails of slices, from a `WheelOnSlices` for both sides.
 
     ``s`` (m) is the arc length of the wheelset's cross-section, ``turned`` (rad) the angle by which it has rolled. The
-    rail is what a wheel sees of it in its pose (`wrcore.contact.changing_rails.sections`). Strips know parabolas along
-    the track, a grid knows the surfaces: where these differ by more than `ROUGH` within a patch a grid takes over, and
-    goes on until the wheel is laid elsewhere, so that a search for a height does not step to and fro."""
+    section of the rail depends on position and attitude of the wheel (`wrcore.contact.changing_rails.sections`). Strips
+    approximate surfaces along the track by parabolas, a grid uses the surfaces. If both differ by more than `ROUGH`
+    within a patch, a grid is used until the wheel is moved, so that a search for a height does not alternate."""
 
     refines = False
 
@@ -47,7 +47,7 @@ class LoadedOnSlices(LoadedWheels):
         self._solve_with(0)
 
     def _solve_with(self, level):
-        """Take one of the numbers of strips."""
+        """Select one of the numbers of strips."""
         self._level = level
         if self._still.strips.strips:
             self._still = self._still._replace(strips=self._still.strips._replace(strips=self._levels[level]))
@@ -59,7 +59,7 @@ class LoadedOnSlices(LoadedWheels):
             handle.renew(handle.value._replace(geometry=self.geometry, strips=self._still.strips))
 
     def _blank(self):
-        """Geometry of the type that all have, of the first place of the rail with one."""
+        """Return the geometry at the first position of the rail that has one; all geometries have the same type."""
         for s in self.pair.rail.s:
             for side in SIDES:
                 geometry, _ = self.pair.under(side, float(s), 0.0)
@@ -68,7 +68,7 @@ class LoadedOnSlices(LoadedWheels):
         raise InputError(self.pair.rail.name, "", "expected a rail below the wheels, got none at y = 0")
 
     def _lie(self, side, y, roll, yaw):
-        """Lay a wheel on what it sees; returns the height of its first touch, NaN where there is nothing."""
+        """Set the geometry under a wheel and return the height of its first contact, m; NaN if there is no rail."""
         pose = (self.s, y, roll, yaw, self.turned)
         if self._seen.get(side, (None,))[0] != pose:
             self._seen[side] = pose, *self.pair.under(side, *pose)
@@ -80,7 +80,7 @@ class LoadedOnSlices(LoadedWheels):
         return touch
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
-        """As for `LoadedWheels`, at ``s``."""
+        """Return patches of one wheel at the arc length ``s``; arguments are those of `LoadedWheels.at_height`."""
         if math.isnan(self._lie(side, y, roll, yaw)):
             return []
         while True:
@@ -91,16 +91,17 @@ class LoadedOnSlices(LoadedWheels):
             self._solve_with(self._level + 1)
 
     def _stood_in(self):
-        """Patches so far on which a grid or fixed strips stood in."""
+        """Return the number of patches so far for which a grid or fixed strips were used."""
         return self._counters[[ON_GRID, ON_FIXED]].sum()
 
     def _on_grids(self, side):
-        """Patches of a wheel, where it lies now, that are solved on grids because no parabolas fit."""
+        """Return the numbers of patches of a wheel, at its present position, that are solved on grids because parabolas
+        do not fit."""
         pose = self._seen.get(side, (None,))[0]
         return {group for (at, group), rough in self._rough.items() if at == side and rough == pose}
 
     def _is_rough(self, which, left, first, last, on_grid):
-        """Whether no parabola fits the gap of a patch along the rail: see `ROUGH`."""
+        """Whether a parabola does not fit the gap of a patch along the rail, see `ROUGH`."""
         if self.always or left.vx < 0.0:
             return False
         side, group = which
@@ -109,7 +110,8 @@ class LoadedOnSlices(LoadedWheels):
         return group in self._on_grids(side)
 
     def _misfit(self, left, first, last):
-        """By how much the gap leaves the parabolas of the strips solved last, over its largest penetration."""
+        """Return the largest difference of gap and parabolas of the strips solved last, relative to the largest
+        penetration."""
         work, pose = self._work, make_pose(*left[:6], self.spatial)
         frame = frame_of_overlaps(self.geometry, pose, self._rows, first, last)
         plane = ContactPlane(frame.x, frame.ur + self.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
@@ -123,12 +125,13 @@ class LoadedOnSlices(LoadedWheels):
         return np.max(np.abs(off), where=np.abs(x - middle) < half, initial=0.0) / max(-gap[:, GAP].min(), 1e-9)
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
-        """As for `LoadedWheels`, at ``s``."""
+        """Return the height z (m) at which one wheel carries a load, at ``s``; arguments as in
+        `LoadedWheels.height`."""
         touch = self._lie(side, y, roll, yaw)
         if math.isnan(touch):
             return math.nan
         z = touch - _SUNK if math.isnan(guess) else guess
-        for _ in FINER:  # anew where other strips, or a grid, have been taken on the way
+        for _ in FINER:  # repeat if the number of strips, or the use of grids, has changed
             level, grids = self._level, self._on_grids(side)
             z = super().height(side, y, load, roll, yaw, rolling, friction, vertical, z)
             if math.isnan(z) or (self._level == level and self._on_grids(side) == grids):
@@ -136,5 +139,5 @@ class LoadedOnSlices(LoadedWheels):
         return z
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
-        """As for `LoadedWheels`, at ``s``."""
+        """Return roll (rad) and height (m) at which each wheel carries a load, at the arc length ``s``."""
         return self._levelled(0.0, math.nan, y, load, yaw, rolling, friction, vertical)

@@ -1,4 +1,4 @@
-"""The real contact patch of one wheel, with pressure, traction, slip and adhesion: ``wr.patch``."""
+"""Non-elliptic contact patches of one wheel with pressure, traction, slip and adhesion: ``wr.patch``."""
 
 from __future__ import annotations
 
@@ -38,31 +38,32 @@ def patch(
     slip: Annotated[str, OneOf(SLIPS)] = "surfaces",
     load_by: Annotated[str, OneOf(("vertical", "normal"))] = "vertical",
 ) -> list[Patch]:
-    """Contact patches of one wheel, solved on the real surfaces.
+    """Solve the contact patches of one wheel on the real surfaces.
 
     Parameters
     ----------
     source : Scene, str, Path, dict or WheelsetOnTrack
-        A scene lends its wheel, rail, gauge and material, and what is left out of load, speed and friction; a pair
-        (with equal sides) the profiles and their places alone.
+        A scene provides wheel, rail, gauge and material, and defaults of load, speed and friction. A pair (with equal
+        sides) provides only the profiles and their positions.
     y, yaw, roll, z : float
-        Pose of the wheelset, m and rad; roll first, then yaw about the vertical. z given: at that height (roll left
-        out: 0). Roll given, z not: the height at which this wheel carries the load. Neither: both wheels carry it.
+        Position and attitude of the wheelset, m and rad; roll first, then yaw about the vertical. If z is given, the
+        wheelset is at that height (default roll: 0). If only roll is given, it is at the height at which this wheel
+        carries the load. If neither is given, both wheels carry it.
     load : float, optional
-        Of a wheel, N; a pair needs one unless z is given. Left out: the scene's first wheelset at rest.
+        Load of a wheel, N; required for a pair unless z is given. Default: that of the scene's first wheelset at rest.
     side : {"left", "right"}
     speed : float, optional
-        m/s; left out: the scene's, for a pair 1.
+        Speed, m/s; default: the scene's, for a pair 1.
     omega : float, optional
-        Rate of rolling, rad/s, positive forward; left out: that of free rolling, at which the longitudinal rigid slip
-        of this wheel has no mean over the pressure.
+        Rate of rolling, rad/s, positive forward. Default: that of free rolling, at which the mean of this wheel's
+        longitudinal rigid slip, weighted by pressure, is zero.
     vy, yaw_rate : float
-        Of the wheelset, m/s and rad/s.
+        Lateral velocity (m/s) and yaw rate (rad/s) of the wheelset.
     mu : float, optional
-        Coefficient of friction; left out: the scene's, for a pair 0.3.
+        Coefficient of friction; default: the scene's, for a pair 0.3.
     method : {"exact", "grid"}
-        Strips (0.5 ms per solution), or a uniform grid (a second), their reference. Where strips find no solution the
-        grid takes over.
+        Strips (0.5 ms per solution), or a uniform grid (a second), their reference. If strips find no solution, the
+        grid is used.
     resolution : {"coarse", "middle", "fine"}
     slip : {"surfaces", "creepages"}
         Rigid slip of the real surfaces, or of one set of creepages per patch.
@@ -72,13 +73,13 @@ def patch(
     Returns
     -------
     list of Patch
-        From the flange to the field side, most often one; empty where the wheel does not touch. Each holds its forces
-        and fields, and draws itself: ``patches[0].plot()``.
+        Patches from the flange to the field side, mostly one; empty if the wheel has no contact. Each contains its
+        forces and fields; ``patches[0].plot()`` draws it.
 
     Raises
     ------
     InputError
-        For an unknown choice, a number in another unit, or a load that no height gives.
+        If a choice is unknown, a number has another unit, or there is no height for the load.
 
     Examples
     --------
@@ -110,17 +111,17 @@ def patch(
 
 
 def pair_of(source, side="left"):
-    """`WheelOnRail` of one side of a source of `patch`: of a scene that of its first wheelset."""
+    """Return the `WheelOnRail` of one side of a source of `patch`; for a scene that of its first wheelset."""
     return getattr(source, side) if isinstance(source, WheelsetOnTrack) else as_scene(source).pair(side)
 
 
 def _of_pair(pair):
-    """Geometry, material and usual values of a pair with equal sides."""
+    """Return geometry, material and default values of a pair with equal sides."""
     return pair.left.geometry, {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
 
 
 def _of_scene(source, side):
-    """The same of a scene: of the first wheelset, if its wheels differ from others."""
+    """Return geometry, material and default values of a scene, for its first wheelset."""
     scene = as_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
     friction = friction_of(scene).largest

@@ -1,4 +1,4 @@
-"""Contact of a wheelset in given poses, at rest or rolling, by any patch model: the table of ``wrcore contact``."""
+"""Contact table of a wheelset at given positions, at rest or rolling, by any patch model, for ``wrcore contact``."""
 
 import math
 
@@ -15,10 +15,10 @@ from wrcore.geometry.track import SIDES
 from wrcore.run.checks.validity import FLAGS, flags
 
 ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
-"""Columns of rolling, empty where the wheelset does not move."""
+"""Columns of rolling, empty if the wheelset is at rest."""
 
 POSE_FLAGS = {"not_loaded": "1 where no height was found at which the wheel carries its load, else 0", **FLAGS}
-"""Flags of a pose's patches, 0 or 1, and what they mean: names as of the counters of a run."""
+"""Meaning of the flags of patches, 0 or 1, by name; the names are those of a run's counters."""
 
 STILL = tuple(name for name in columns.CHANNELS if name not in ROLLING)
 FIELDS = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m",
@@ -29,17 +29,19 @@ def loaded_poses(
     poses, geometry, wheel_load, patch="moment", resolution="fine", slip="surfaces", load_by="vertical", friction=0.3,
     detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28,
 ):  # fmt: skip
-    """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.rigid.pose_file.read_poses`:
-    columns
-    FIELDS, a row per patch, none without contact or equilibrium; ``attrs``: patches solved ``on_grid`` instead of
-    strips, and ``on_fixed_strips``, whose tips were not found; wheels ``without_height`` that no height loads.
+    """Return a table of the patches of both wheels at each position of a table ``poses``.
 
-    z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
-    Neither: both are solved so that each wheel carries it. In place of a ``geometry`` a `WheelOnSlices` stands for both
-    sides, at the arc length ``s_m`` of each pose, rolled forward by ``pitch_rad``. With V_m_per_s above 0 the wheelset
-    rolls, freely where omega_rad_per_s is not given; else it stands. ``load_by``: the load (N per wheel) is the
-    ``vertical`` sum of all forces on a wheel, or that of its ``normal`` forces; ``friction`` holds where a pose has no
-    ``mu``; all else as for `LoadedWheels`.
+    ``poses`` is a result of :func:`wrcore.contact.rigid.pose_file.read_poses`. The columns are FIELDS, with a row per
+    patch and no row without contact or equilibrium. ``attrs`` are counts: patches solved ``on_grid`` instead of strips,
+    patches ``on_fixed_strips``, whose tips were not found, and wheels ``without_height`` for the load.
+
+    If z is given, forces are those at that height (default roll: 0). If only roll is given, each side is solved for the
+    load separately. If neither is given, roll and height are those at which each wheel carries the load. A
+    `WheelOnSlices` instead of a ``geometry`` applies to both sides, at the arc length ``s_m`` of each position, rolled
+    forward by ``pitch_rad``. If V_m_per_s is above 0, the wheelset rolls, freely without omega_rad_per_s; else it is at
+    rest. ``load_by``: the load (N per wheel) is the ``vertical`` component of all forces on a wheel, or the sum of its
+    ``normal`` forces. ``friction`` applies if a position has no ``mu``. The other arguments are those of
+    `LoadedWheels`.
     """
     check_number(wheel_load, 1e-9, 1e6, "contact", "wheel_load", "N")
     check_number(friction, 0.0, 2.0, "contact", "friction")
@@ -84,8 +86,11 @@ def loaded_poses(
 
 
 def pose_flags(contact, found, load, roll, yaw, vertical=True):
-    """Residual of the load (N; carried less asked, NaN without a ``load``) by side, and `POSE_FLAGS` of each patch, a
-    list of dictionaries by side, of a wheelset in a pose (rad); ``found``: geometry and patches (`Found`) by side."""
+    """Return the load residual by side, and `POSE_FLAGS` of each patch as a list of dictionaries by side.
+
+    The residual (N) is carried minus required load, NaN without a ``load``. ``found`` are geometry and patches
+    (`Found`) by side of a wheelset with roll and yaw (rad).
+    """
     rows = np.full((1, 1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS), np.nan)
     for side, (_, patches) in found.items():
         for number, one in enumerate(patches):
@@ -105,6 +110,6 @@ def pose_flags(contact, found, load, roll, yaw, vertical=True):
 
 
 def _given(pose, name, otherwise):
-    """A number of a pose, or what holds where its column is missing or empty."""
+    """Return a number of a table's row, or ``otherwise`` if its column is missing or empty."""
     value = getattr(pose, name, math.nan)
     return otherwise if math.isnan(value) else value
