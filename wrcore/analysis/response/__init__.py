@@ -1,1 +1,1 @@
-"""How a vehicle answers forces, irregularity, curves and cant, without integration over time."""
+"""Response of a vehicle to forces, irregularity, curves and cant, without integration over time."""

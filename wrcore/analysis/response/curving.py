@@ -1,4 +1,4 @@
-"""Quasi-static curving: wheel forces and places in the balance of constant curves, and roll on canted track."""
+"""Quasi-static curving: wheel forces and positions in equilibrium on constant curves, and roll on canted track."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from wrcore.scene.description import Scene, Source, as_scene
 from wrcore.vehicle.description import GRAVITY
 
 LARGEST_RESIDUAL = 1e-4
-"""A curve in which accelerations above this are left has no balance, m/s^2 or rad/s^2 (chosen: 1e-5 of gravity)."""
+"""Largest residual acceleration of an equilibrium in a curve, m/s^2 or rad/s^2 (chosen: 1e-5 of gravity)."""
 
 CANT = Annotated[float, Within(0.0, 0.5, "m")]
 
@@ -39,41 +39,43 @@ def quasi_static_curving(
     cant_deficiency: Annotated[float | None, Within(-0.5, 0.5, "m")] = None,
     widening: Annotated[float, Within(-0.05, 0.05, "m")] = 0.0,
 ) -> pd.DataFrame:
-    """Balance of a scene's vehicle in constant curves, without integration over time.
+    """Compute the equilibrium of a scene's vehicle in constant curves, without integration over time.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Its path, gradients, irregularity, drive and control do not count. Friction is the scene's.
+        Its path, gradients, irregularity, drive and control are ignored. Friction is the scene's.
     radii : array_like, shape (n,)
-        m, positive to the left, 20 m or more.
+        Radii of the curves, m, positive to the left, 20 m or more.
     cant : float
-        Outer rail above the inner one, over 1.5 m, m.
+        Height of the outer rail above the inner rail, over 1.5 m, m.
     speed : float, optional
-        m/s; left out: the scene's, or that of the cant deficiency.
+        Speed, m/s; default: the scene's, or that of the cant deficiency.
     cant_deficiency : float, optional
-        I = 1.5 m v^2/(g R) - cant, m: the speed in each curve follows.
+        I = 1.5 m v^2/(g R) - cant, m, which determines the speed in each curve.
     widening : float
-        Of the gauge, m.
+        Widening of the gauge, m.
 
     Returns
     -------
     pandas.DataFrame
         A row per curve and wheel: radius_m, speed_m_per_s, cant_m, cant_deficiency_m; wheelset, side; y_m and yaw_rad
         of the wheelset in the axes of the track (yaw is its angle of attack); Q_N, Y_N, Y_over_Q, T_gamma_N of the
-        wheel, sum_Y_N of the wheelset; acceleration_m_per_s2 with which creep slows down what nothing pulls;
-        residual_m_per_s2, what of accelerations is left. Where no balance is found, all but the latter is NaN.
+        wheel, sum_Y_N of the wheelset; acceleration_m_per_s2, at which creep changes the speed of the vehicle without
+        traction; residual_m_per_s2, the residual acceleration. Without an equilibrium, all results except the residual
+        are NaN.
 
     Raises
     ------
     InputError
-        For a radius or a speed out of bounds, speed and cant deficiency together, or a vehicle whose friction depends
-        on how it came there (elements with ``approach``).
+        If a radius or a speed is out of bounds, if speed and cant deficiency are both given, or if the friction of the
+        vehicle depends on its history (elements with ``approach``).
 
     Notes
     -----
-    One continuation from straight track through growing curvature, for curves to the left and to the right each.
-    Accelerations vanish in axes that go round with the vehicle; whether the balance is stable is not asked.
+    Curves to the left and to the right are each solved by continuation from straight track, in the order of increasing
+    curvature. Accelerations are zero in axes that rotate with the vehicle. The stability of the equilibrium is not
+    examined.
 
     Examples
     --------
@@ -105,7 +107,7 @@ def quasi_static_curving(
 
 
 class Curving:
-    """A scene's vehicle on curves without end."""
+    """A scene's vehicle on constant curves of infinite length."""
 
     def __init__(self, scene: Scene) -> None:
         for item in scene.vehicle.data.get("elements", ()):
@@ -124,7 +126,8 @@ class Curving:
         self.straight = straight_balance(model, state)
 
     def follow(self, curves):
-        """Pairs of a curve's number and its `CurveBalance`, from the widest curve on, to the left and to the right."""
+        """Yield the index of each curve and its `CurveBalance`, to the left and then to the right, from the largest
+        radius on."""
         for side in (1.0, -1.0):
             known = self.straight
             numbers = [k for k, curve in enumerate(curves) if math.copysign(1.0, curve.curvature) == side]
@@ -134,7 +137,7 @@ class Curving:
                 yield k, found
 
     def observe(self, found: list[CurveBalance]) -> Run:
-        """Channels of balances, one after the other as if over time."""
+        """Return a run with the channels of equilibria, whose output times are their indices."""
         vehicle, groups = self.scene.vehicle, {}
         states, patches = (np.array([getattr(one, name) for one in found]) for name in ("state", "patches"))
         for body, name in enumerate(vehicle.body_names):
@@ -147,7 +150,7 @@ class Curving:
         return Run(self.scene.data, "completed", "", np.arange(len(found)), groups)
 
     def table(self, radii: np.ndarray, curves: list[Curve], found: list[CurveBalance]) -> pd.DataFrame:
-        """Rows of :func:`quasi_static_curving`."""
+        """Return the table of :func:`quasi_static_curving`."""
         run, parts = self.observe(found), []
         residuals, slowing = (np.array([getattr(one, name) for one in found]) for name in ("residual", "acceleration"))
         good = np.where(residuals < self.limit, 1.0, np.nan)
@@ -169,15 +172,15 @@ class Curving:
 
 @checked
 def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m")] = 0.1) -> pd.DataFrame:
-    """Roll coefficient (flexibility coefficient) s of a scene's vehicle: how far bodies roll on canted track, relative
-    to its plane, per cant angle.
+    """Compute the roll coefficient (flexibility coefficient) s of a scene's vehicle: roll of bodies on canted track,
+    relative to its plane, per cant angle.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Its path, irregularity, drive and control do not count.
+        Its path, irregularity, drive and control are ignored.
     cant : float
-        Over 1.5 m, m; of influence where suspensions are not linear (bump stops).
+        Cant over 1.5 m, m; it affects the result if suspensions are nonlinear (bump stops).
 
     Returns
     -------
@@ -188,13 +191,13 @@ def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m"
     Raises
     ------
     InputError
-        As :func:`quasi_static_curving`, and where there is no balance on this cant.
+        In the cases of :func:`quasi_static_curving`, and if there is no equilibrium on this cant.
 
     Notes
     -----
-    EN 15686 and EN 14363 (recalled) measure it on a vehicle that stands. Here its wheels roll on along straight canted
-    track, so that creep holds the wheelsets; forces on bodies are those at rest. A wheelset's own row is what its shift
-    to the lower rail makes of its roll; it is part of what the bodies above it roll.
+    EN 15686 and EN 14363 (recalled) measure it on a vehicle at rest. Here the wheels roll along straight canted track,
+    so that creep forces hold the wheelsets; forces on bodies are those at rest. The row of a wheelset is its roll due
+    to its shift to the lower rail. It contributes to the roll of the bodies above it.
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""Frequency response: what small harmonic forces and irregularity make of a vehicle that runs steadily ahead.
+"""Frequency response of a vehicle in steady running to small harmonic forces and irregularity.
 
-About steady running x' = A x + B u, y = C x + D u. Forces enter the accelerations that the joints leave free.
-Irregularity acts by a rail's deviation under each wheelset and its first two derivatives along the track. At the
-frequency omega those are d, (i omega / v) d and (i omega / v)^2 d, and a wheelset that runs L behind the moving frame's
-origin meets them later by L/v: d carries its own exp(-i omega L / v).
+The system, linearised about steady running, is x' = A x + B u, y = C x + D u. Forces act on the accelerations that the
+joints leave free. Irregularity acts by a rail's deviation under each wheelset and its first two derivatives along the
+track. At the frequency omega these are d, (i omega / v) d and (i omega / v)^2 d. A wheelset at the distance L behind
+the moving frame's origin reaches them later by L/v, so that d has the factor exp(-i omega L / v).
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ FORCES = ("Fx_N", "Fy_N", "Fz_N", "Mx_Nm", "My_Nm", "Mz_Nm")
 """Forces at a body's centre of mass and moments about it, in the order of its coordinates."""
 
 DEVIATIONS = dict(zip((*MEANS, *CHANNELS), [*combine(*np.eye(4)), *np.eye(4)], strict=True))
-"""What each kind of irregularity adds to the rails' four deviations."""
+"""Contribution of each kind of irregularity to the four deviations of the rails."""
 
 DEVIATION_STEPS = (1e-7, 1e-6, 1e-6)
-"""Of the difference quotients in a rail's deviation (m), its slope, and its curvature (1/m)."""
+"""Steps of the difference quotients in a rail's deviation (m), its slope, and its curvature (1/m)."""
 
 CELL = 0.2
-"""Length of track that is deviated under a wheelset, m."""
+"""Length of track with a deviation under a wheelset, m."""
 
 
 @checked
@@ -53,34 +53,34 @@ def frequency_response(
     frequencies: Annotated[ArrayLike, Within(1e-6, 1e5, "Hz", 1)],
     speed: float | None = None,
 ) -> pd.DataFrame:
-    """Frequency response of a scene's vehicle, linearised about steady running on a tangent, perfect track.
+    """Compute the frequency response of a scene's vehicle, linearised about steady running on a tangent, perfect track.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Path, irregularity, drive and control of it do not count; flexible track does.
+        Its path, irregularity, drive and control are ignored; flexible track is included.
     inputs : sequence of str
-        Irregularity: ``alignment`` or ``level`` (lateral or vertical, both rails alike), ``cross_level`` (left less
+        Irregularity: ``alignment`` or ``level`` (lateral or vertical, equal on both rails), ``cross_level`` (left minus
         right height), ``gauge`` (its change), or one rail's ``left_lateral``, ``left_vertical``, ``right_lateral``,
         ``right_vertical``. Forces on a body: ``car_body.Fz_N`` and so on (x, y, z), moments ``car_body.Mx_Nm``.
     outputs : sequence of str
         Channels of a run with one number at each time: ``car_body.az_m_per_s2``, ``wheelset_1/left.Q_N``.
     frequencies : array_like
-        Hz, 1e-6 to 1e5.
+        Frequencies, Hz, 1e-6 to 1e5.
     speed : float, optional
-        m/s; left out: the scene's.
+        Speed, m/s; default: the scene's.
 
     Returns
     -------
     pandas.DataFrame
         Complex amplitudes of the outputs per unit of the input (m, N or N m), positive phases leading; index
         ``frequency_Hz``, columns ``(input, output)``. The phase of irregularity is that at the moving frame's origin,
-        from which the vehicle file counts x.
+        which is the origin of x in the vehicle file.
 
     Raises
     ------
     InputError
-        For an unknown input or output, or where small motions grow.
+        If an input or output is unknown, or if the steady running is unstable.
 
     Notes
     -----
@@ -119,7 +119,7 @@ def frequency_response(
 
 
 def observable(scene: Scene) -> Scene:
-    """The scene without its drive and control, with all channels that outputs may follow from."""
+    """Return the scene without its drive and control, with all channels from which outputs are derived."""
     data = copy.deepcopy(scene.data)
     data.pop("drive", None)
     data.pop("control", None)
@@ -128,7 +128,7 @@ def observable(scene: Scene) -> Scene:
 
 
 class _Systems:
-    """The linear system of some outputs: C, and B and D of the inputs."""
+    """Linear system of a vehicle with chosen outputs: matrix C, and B and D of the inputs."""
 
     def __init__(self, simulation: Simulation, model: Model, motion: Linearisation, outputs: list[str]) -> None:
         self.simulation, self.model, self.motion = simulation, model, motion
@@ -142,7 +142,7 @@ class _Systems:
         self.observation = (values[: len(moves)] - values[len(moves) :]).T / (2.0 * motion.steps)
 
     def _observed(self, model, times, states):
-        """The outputs (n, p) of states (n, size) at times (n,), s; of accelerations the velocities."""
+        """Return the outputs (n, p) of states (n, size) at times (n,), s; for accelerations the velocities."""
         run = self.simulation.observe(model, times, states)
         columns = []
         for name, _ in self.outputs:
@@ -158,7 +158,7 @@ class _Systems:
         return np.array(columns).T
 
     def answers(self, omega, forced, direct):
-        """Complex outputs (n, p) at frequencies (n,), rad/s, from B u (n, m) and D u (n, p)."""
+        """Return complex outputs (n, p) at frequencies (n,), rad/s, from B u (n, m) and D u (n, p)."""
         size, rows = len(self.motion.matrix), []
         for w, force, through in zip(omega, forced, direct, strict=True):
             state = np.linalg.solve(1j * w * np.eye(size) - self.motion.matrix, force)
@@ -166,7 +166,7 @@ class _Systems:
         return np.array(rows)
 
     def of_input(self, name, omega):
-        """B u (n, m) and D u (n, p) of a unit of an input at frequencies (n,), rad/s."""
+        """Return B u (n, m) and D u (n, p) of a unit input at frequencies (n,), rad/s."""
         if name in DEVIATIONS:
             return self._of_irregularity(DEVIATIONS[name], omega)
         body, _, force = name.rpartition(".")
@@ -178,7 +178,7 @@ class _Systems:
         return np.tile(forced, (len(omega), 1)), np.zeros((len(omega), len(self.outputs)))
 
     def _of_force(self, place):
-        """B (m,) of a unit force on a coordinate: what the joints leave of it, (N^T M N)^-1 N^T."""
+        """Return B (m,) of a unit force on a coordinate, projected on the free velocities N: (N^T M N)^-1 N^T."""
         bodies, free, at = self.model.bodies, self.free, self.motion.places
         mass = np.diag(np.repeat(bodies.mass, 6))
         for b, tensor in enumerate(inertia_tensors(bodies)):
@@ -188,7 +188,10 @@ class _Systems:
         return out
 
     def _of_irregularity(self, weights, omega):
-        """As `of_input`: by central differences, each at a place of its own behind the track's beginning."""
+        """Return B u (n, m) and D u (n, p) of a unit irregularity by central differences.
+
+        Each difference uses another position behind the beginning of the track.
+        """
         model, motion = self.model, self.motion
         x = motion.state[STATE_SIZE * model.bodies.wheelsets]
         cases = [(k, order, sign) for k in range(len(x)) for order in range(3) for sign in (1.0, -1.0)]
@@ -213,7 +216,7 @@ class _Systems:
         return forced, direct
 
     def _evaluated(self, model, times, states):
-        """Outputs (n, p) and rates x' (n, m), without those of displacements, of states at times (n,), s."""
+        """Return outputs (n, p) and rates x' (n, m), those of displacements zero, of states at times (n,), s."""
         _, _, rates = evaluated(model, Trajectory("", times, states, "completed", ""))
         changes, bodies = accelerations(model, states, rates), 6 * len(model.bodies.mass)
         still = np.zeros((len(times), self.motion.places))
@@ -222,7 +225,7 @@ class _Systems:
 
 
 def _integrated(name):
-    """An output's name, of an acceleration its velocity's, and whether that is to be differentiated."""
+    """Return the name of an output, or of the velocity if it is an acceleration, and whether to differentiate it."""
     group, _, channel = name.rpartition(".")
     if channel.startswith("a") and channel.endswith("_m_per_s2"):
         return f"{group}.v{channel[1]}_m_per_s", True
@@ -230,8 +233,11 @@ def _integrated(name):
 
 
 def _cell(order, values, s):
-    """Powers (1, 4, 4) of the distance from the beginning of a cell about s (m) with a derivative (4,) there, and where
-    it begins."""
+    """Return the polynomial coefficients (1, 4, 4) of a cell of track about s (m), and the arc length of its beginning.
+
+    At s the derivative of the given order of the four deviations has the ``values`` (4,). The coefficients are those of
+    powers of the distance from the beginning.
+    """
     half, powers = 0.5 * CELL, np.zeros((1, 4, 4))
     shape = ([1.0], [-half, 1.0], [0.5 * half**2, -half, 0.5])[order]
     powers[0, : len(shape)] = np.outer(shape, values)
@@ -239,7 +245,7 @@ def _cell(order, values, s):
 
 
 def _joined(cells):
-    """IrregularityData of cells."""
+    """Return the `IrregularityData` of several cells."""
     powers, starts = zip(*cells, strict=True)
     count = len(cells)
     return IrregularityData(np.concatenate(powers), np.array(starts), np.full(count, CELL), np.arange(count + 1))

@@ -1,1 +1,1 @@
-"""Whether a vehicle runs stably: modes, critical speeds, limit cycles."""
+"""Running stability of a vehicle: modes, critical speeds and limit cycles."""

@@ -1,9 +1,9 @@
-"""Limit cycles of vehicles over speed: what is left of a large and of a small disturbance.
+"""Limit cycles of vehicles as a function of speed: final amplitudes after a large and after a small disturbance.
 
-A motion is followed in windows of equal length until its amplitude has settled. *Falling*: a large disturbance at the
-highest speed, and the state is carried from speed to speed downwards; it stays on a limit cycle for as long as there is
-one. *Rising*: a small disturbance at each speed, carried upwards; it stays at rest for as long as that is stable. Where
-the branches differ, the disturbance decides.
+A motion is simulated in windows of equal length until its amplitude has settled. *Falling* branch: a large disturbance
+at the highest speed; the final state is the initial state at the next lower speed. It stays on a limit cycle as long as
+one exists. *Rising* branch: a small disturbance at each speed, in the order of increasing speed. The vehicle stays at
+rest as long as this is stable. Where the branches differ, the final motion depends on the disturbance.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ from wrcore.scene.description import Source, as_scene
 COLUMNS = (
     "speed_m_per_s", "amplitude_m", "frequency_Hz", "offset_m", "simulated_s", "status",
 )  # fmt: skip
-CYCLES = ("limit cycle", "irregular")  # status of motions that do not die away
-DISTURBANCES = (0.006, 0.0065, 0.007, 0.008, 0.009)  # sideways shifts that may end on a cycle, m
+CYCLES = ("limit cycle", "irregular")  # status of motions that do not decay
+DISTURBANCES = (0.006, 0.0065, 0.007, 0.008, 0.009)  # lateral displacements that may lead to a limit cycle, m
 
 
 @checked
 @dataclass(frozen=True)
 class Settling:
-    """How a motion is followed until it has settled.
+    """Settings of the simulation of a motion until its amplitude has settled.
 
     Attributes
     ----------
     window : float
         Length of a window, s; several periods.
     longest : float
-        A motion that still changes after this time is taken as it is, s: growing or decaying in each window since
-        half-way, or irregular.
+        Longest simulated time, s. A motion that still changes then is growing or decaying if its amplitude did so in
+        each window of the second half, else irregular.
     change : float
-        Amplitudes of three windows in a row that differ by less than this part count as settled.
+        Largest relative difference of the amplitudes of three successive windows of a settled motion.
     rest : float
-        A smaller amplitude than this is no limit cycle, m.
+        Amplitude below which a motion is not a limit cycle, m.
     disturbance : float
-        Sideways shift of the vehicle that tries whether running straight ahead is stable, m, above ``rest``.
+        Lateral displacement of the vehicle that tests the stability of straight running, m, above ``rest``.
     rate : float
-        Samples per second of the amplitude.
+        Sampling rate of the amplitude, 1/s.
     method : str
     rtol : float
         Integration method and tolerance, see `wrcore.integrate.integrator.integrate`.
@@ -78,7 +78,8 @@ class Settling:
 
 
 def _run(model, state, settling):
-    """Lateral positions (samples, wheelsets) over a window, the state at its end, and whether the wheels stay on."""
+    """Simulate a window: return times (s), lateral positions (samples, wheelsets), m, the final state, and whether the
+    vehicle has not derailed."""
     times = np.linspace(0.0, settling.window, round(settling.window * settling.rate) + 1)
     run = integrate(model, state, times, settling.method, settling.rtol, derailed_y=DERAILED_Y)
     lateral = run.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
@@ -86,13 +87,13 @@ def _run(model, state, settling):
 
 
 def settle_motion(model, state, settling):
-    """Follow a motion on a tangent, perfect track until its amplitude has settled: a row of what the last window shows,
-    and the state at the end.
+    """Simulate a motion on a tangent, perfect track until its amplitude has settled; return a row of results and the
+    final state.
 
-    The row: speed_m_per_s; amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN if it derails),
-    frequency_Hz and offset_m (mean) of that wheelset; simulated_s; derailed; status: ``at rest``, ``limit cycle``, or
-    after the longest time ``growing``, ``decaying`` or ``irregular``. Windows of a chaotic motion seldom agree, but
-    may: whether it is irregular or a limit cycle then depends on the last bits.
+    The row, of the last window: speed_m_per_s; amplitude_m (half of the peak-to-peak value, of the wheelset with the
+    largest; NaN if it derails), frequency_Hz and offset_m (mean) of that wheelset; simulated_s; status: ``derailed``,
+    ``at rest``, ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``. Amplitudes of a
+    chaotic motion may agree by chance; then rounding errors determine whether its status is irregular or limit cycle.
     """
     amplitudes, elapsed, status = [], 0.0, ""
     while not status:
@@ -104,7 +105,7 @@ def settle_motion(model, state, settling):
 
 
 def _window(model, state, settling):
-    """What a window shows (the first entries of the row of `settle_motion`), the state at its end, and its length."""
+    """Simulate a window: return the first entries of the row of `settle_motion`, the final state, and its length, s."""
     t, lateral, state, on_rails = _run(model, state, settling)
     _, state = at_speed(model, state, model.speed, t[-1])
     spans = 0.5 * np.ptp(lateral, axis=0)
@@ -119,7 +120,7 @@ def _window(model, state, settling):
 
 
 def _status(amplitudes, elapsed, settling):
-    """What the amplitudes of all windows so far show; empty while they show nothing."""
+    """Return the status of a motion from the amplitudes of all windows so far; empty if it has not settled."""
     last = amplitudes[-1]
     if last < settling.rest:
         return "at rest"
@@ -132,23 +133,24 @@ def _status(amplitudes, elapsed, settling):
 
 
 def shifted(model, state, shift):
-    """A state with all bodies shifted sideways (m)."""
+    """Return a state with all bodies displaced laterally by ``shift`` (m, positive to the left)."""
     state = state.copy()
     state[1 : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] += shift
     return state
 
 
 class Watch:
-    """What is said of the speeds of a branch, and whether it was stopped: ``say`` gets a line after each speed; without
-    it lines go to standard error once the work takes long. Ctrl-C ends a branch, which keeps its rows, where it may be
-    ``stoppable``; else it is an error as ever."""
+    """Progress messages of a branch, and whether Ctrl-C stopped it.
+
+    ``say`` is called with a line after each speed; by default lines go to standard error after some seconds. If
+    ``stoppable``, Ctrl-C ends a branch and its rows are kept; else KeyboardInterrupt is raised."""
 
     def __init__(self, say=None, stoppable=False):
         self.say, self.stoppable, self.stopped, self.begun = say, stoppable, False, time.monotonic()
 
     @contextmanager
     def branch(self):
-        """Around the speeds of a branch."""
+        """Context of a branch that catches Ctrl-C if ``stoppable``."""
         try:
             yield
         except KeyboardInterrupt:
@@ -157,7 +159,7 @@ class Watch:
             self.stopped = True
 
     def tell(self, name, row, remaining):
-        """Say what a speed of a branch has shown, and how many speeds remain at most."""
+        """Report the status at a speed of a branch and the largest number of remaining speeds."""
         text = f"{name}, {row['speed_m_per_s']:g} m/s: {row['status']}; at most {remaining} speeds remain"
         if self.say is not None:
             self.say(text)
@@ -165,7 +167,7 @@ class Watch:
             tell(f"limit cycles: {text}")
 
     def end(self, table, asker):
-        """The table, or the interrupt where it is empty; a table that was stopped says so (``attrs``)."""
+        """Return the table, with ``attrs["stopped"]`` if Ctrl-C stopped it; KeyboardInterrupt if it is empty then."""
         if self.stopped:
             if table.empty:
                 raise KeyboardInterrupt
@@ -175,13 +177,14 @@ class Watch:
 
 
 def falling_branch(model, state, speeds, settling, disturbances, resolution, watch=None):
-    """Amplitude of the limit cycle from the highest speed downwards: rows of `settle_motion`, fastest first, the last
-    one the fastest motion that comes to rest. The speed at which the limit cycle ends is halved to ``resolution``.
+    """Compute amplitudes of the limit cycle from the highest speed downwards.
 
-    ``state`` runs straight ahead at the model's speed, ``speeds`` rise (m/s), ``disturbances`` are sideways shifts (m).
-    The motion is carried from speed to speed. Where its amplitude drops by a third or more, fresh disturbances are
-    tried as well and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
-    Where every disturbance derails, the next lower speed is tried.
+    Return rows of `settle_motion`, highest speed first; the last row is the fastest motion that comes to rest. The
+    speed at which the limit cycle ends is located by bisection to ``resolution`` (m/s). ``state`` is straight running
+    at the model's speed, ``speeds`` increase (m/s), ``disturbances`` are lateral displacements (m). The final state at
+    a speed is the initial state at the next one. If the amplitude decreases by a third or more, all disturbances are
+    tried, too, and the motion with the largest amplitude is used, because an irregular motion can change to another
+    limit cycle. If every disturbance leads to derailment, the next lower speed is tried.
     """
     rows: list[dict[str, Any]] = []
     lost, below, queue, watch = [], None, list(speeds), watch or Watch()
@@ -211,8 +214,10 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution, wat
 
 
 def rising_branch(model, state, speeds, settling, watch=None):
-    """Amplitude that a small disturbance leaves, from the lowest speed upwards; arguments as for `falling_branch`. The
-    motion is carried from speed to speed and disturbed again (``settling.disturbance``) at each.
+    """Compute final amplitudes after a small disturbance, from the lowest speed upwards.
+
+    Arguments are those of `falling_branch`. The final state at a speed, displaced again by ``settling.disturbance``, is
+    the initial state at the next one.
     """
     rows, watch = [], watch or Watch()
     with watch.branch():
@@ -235,35 +240,35 @@ def limit_cycles(
     resolution: Annotated[float, Within(1e-3, 150.0, "m/s")] = 0.25,
     say: Callable[[str], object] | None = None,
 ) -> pd.DataFrame:
-    """Both branches of a scene's vehicle. Ctrl-C stops it: it then returns the rows that it has.
+    """Compute limit cycles of a scene's vehicle over speed, in both branches; Ctrl-C stops and returns the rows so far.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Runs are on a tangent, perfect track, whatever it says of path, gradients and irregularity; neither its drive
-        and control nor where the vehicle starts count.
+        Runs are on a tangent, perfect track. The scene's path, gradients, irregularity, drive, control and initial
+        state are ignored.
     speeds : sequence of float
-        Rising, m/s.
+        Increasing speeds, m/s.
     settling : Settling, optional
-        Left out: its defaults.
+        Settings of the simulations; by default those of `Settling`.
     disturbances : sequence of float
-        Sideways shifts of the vehicle that may end on a cycle, one or more, within 0.05 m.
+        Lateral displacements of the vehicle that may lead to a limit cycle, one or more, within 0.05 m.
     resolution : float
-        Of the lowest speed with a limit cycle, m/s, at least 1e-3.
+        Resolution of the lowest speed with a limit cycle, m/s, at least 1e-3.
     say : callable, optional
-        Called with a line after each speed: what was found there, and how many speeds remain at most. Left out: lines
-        on standard error, once the work takes three seconds (none with ``WRCORE_PROGRESS=0``).
+        Called with a line after each speed: the result, and the largest number of remaining speeds. By default lines
+        go to standard error after three seconds (none with ``WRCORE_PROGRESS=0``).
 
     Returns
     -------
     pandas.DataFrame
-        Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch. Where Ctrl-C stopped it,
-        ``table.attrs["stopped"]`` is True, and a line on standard error says so.
+        Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch. After Ctrl-C,
+        ``table.attrs["stopped"]`` is True, and a line on standard error reports it.
 
     Raises
     ------
     InputError
-        For speeds that do not rise, a number out of bounds, or no disturbance.
+        If speeds do not increase, a number is out of bounds, or there is no disturbance.
 
     Examples
     --------
@@ -295,39 +300,40 @@ def speed_ramp(
     settling: Settling | None = None,
     disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = DISTURBANCES,
 ) -> pd.DataFrame:
-    """Nonlinear critical speed by a ramp: a vehicle that hunts above it slows down until the motion dies.
+    """Simulate a decreasing speed ramp of a hunting vehicle, from which the nonlinear critical speed is read.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Runs are on a tangent, perfect track, whatever it says of path, gradients and irregularity; neither its drive
-        and control nor where the vehicle starts count.
+        Runs are on a tangent, perfect track. The scene's path, gradients, irregularity, drive, control and initial
+        state are ignored.
     start, end : float
         Speeds between which the vehicle slows down, m/s.
     rate : float
-        m/s^2: the speed falls by rate times ``settling.window`` from window to window, and is constant in each.
+        Deceleration, m/s^2. The speed is constant in each window and decreases by rate times ``settling.window`` from
+        window to window.
     settling : Settling, optional
-        How a motion at the start is followed until it has settled, window and method; the ramp ends at an amplitude
-        below its ``rest``. Left out: its defaults, but for windows of 1 s.
+        Settings of the simulations: of the initial motion until it has settled, and window and method of the ramp. The
+        ramp ends at an amplitude below its ``rest``. By default those of `Settling`, with windows of 1 s.
     disturbances : sequence of float
-        Sideways shifts of the vehicle at the start, m: the largest motion that settles from one goes on.
+        Lateral displacements of the vehicle at the start, m; the settled motion with the largest amplitude is used.
 
     Returns
     -------
     pandas.DataFrame
         A row per window: t_s at its end; speed_m_per_s, amplitude_m (NaN: derailed), frequency_Hz, offset_m as in
-        :func:`limit_cycles`; stopped by Ctrl-C, the rows so far, as there.
+        :func:`limit_cycles`. After Ctrl-C, the rows so far, as in :func:`limit_cycles`.
 
     Raises
     ------
     InputError
-        Where the speeds do not fall.
+        If ``end`` is not below ``start``.
 
     Notes
     -----
-    Read off: the lowest speed whose amplitude is above some limit. It is below the limit cycle's fold by what the
-    vehicle slows down while the motion decays: half the rate should give next to the same. It is one motion in one run;
-    :func:`limit_cycles` tries fresh disturbances where an amplitude drops.
+    The nonlinear critical speed is the lowest speed with an amplitude above some limit. It is below the fold of the
+    limit cycle, because the vehicle slows down while the motion decays. Half the rate should lead to almost the same
+    speed. The ramp follows one motion; :func:`limit_cycles` tries new disturbances if an amplitude decreases.
 
     Examples
     --------
@@ -356,9 +362,11 @@ def speed_ramp(
 
 
 def nonlinear_critical_speed(table):
-    """Dict of nonlinear_critical_speed_m_per_s, half-way between the slowest limit cycle and the fastest motion that
-    came to rest in a table of :func:`limit_cycles` (NaN if all or none did), their distance uncertainty_m_per_s, and
-    amplitude_m and cycle_frequency_Hz of that limit cycle.
+    """Return the nonlinear critical speed from a table of :func:`limit_cycles`, as a dict.
+
+    nonlinear_critical_speed_m_per_s is the mean of the lowest speed with a limit cycle and the highest speed at which
+    the motion came to rest in the falling branch (NaN without one of them). uncertainty_m_per_s is their difference.
+    amplitude_m and cycle_frequency_Hz are those of this limit cycle.
     """
     falling = table[table["branch"] == "falling"]
     cycles, rest = falling[falling["status"].isin(CYCLES)], falling[falling["status"].isin(["at rest", "decaying"])]

@@ -1,25 +1,26 @@
-"""Modes of small motions, named after their shapes.
+"""Modes of small motions of a vehicle, named by their shapes.
 
-Bodies form families: those named alike up to a number and a side (``bogie_1`` and ``bogie_2``, or
-``axle_box_1_left`` and others). Energies are kinetic, as parts of the mode's whole. In this order:
+Bodies form families: their names differ only by a number and a side (``bogie_1`` and ``bogie_2``, or
+``axle_box_1_left`` and others). Energies are kinetic, as fractions of the mode's total. The first rule that applies
+determines the name:
 
-* *rails* or *sleeper* lateral, vertical, roll: the mass of a flexible track has more energy than all bodies together,
-  or, of rails without mass, hardly oscillates and rails move more than any body. Both rails of the wheelset that moves
-  most go *in phase* or *in antiphase*, or one of them alone;
-* *neutral*: the eigenvalue is below `NEUTRAL`; a displacement that nothing resists, such as that along the track;
+* *rails* or *sleeper* lateral, vertical, roll: the mass of a flexible track has more energy than all bodies together.
+  Rails without mass: the mode hardly oscillates and rails move more than any body. Both rails of the wheelset with the
+  largest motion move *in phase* or *in antiphase*, or only one of them moves;
+* *neutral*: the eigenvalue is below `NEUTRAL`; a displacement without resistance, such as that along the track;
 * *series damper*: hardly oscillates (`OVERDAMPED`), and dampers in series with springs move more than any body;
 * *spin, lateral, yaw creep*: hardly oscillates, wheelsets have most energy, in that coordinate;
 * *contact bounce, contact roll*: oscillates, wheelsets have most energy, in that coordinate;
-* *hunting*: oscillates (damping ratio below `LIGHT`); wheelsets roll where they point, y' = V psi (the two differ by
-  less than half of their sum); they have more energy sideways than in yaw, in both together at least `HUNTING` and two
-  thirds of that of any family but the heaviest;
-* else *surge, lateral, bounce, roll, pitch, yaw*: the coordinate with most energy of the family with most energy. Of
-  the heaviest family, lateral motion and roll come together: *lower sway* about a pole below its centre of mass,
-  *upper sway* about one above.
+* *hunting*: oscillates (damping ratio below `LIGHT`); wheelsets roll in the direction of their yaw, y' = V psi (the two
+  differ by less than half of their sum). They have more energy in lateral motion than in yaw. Both together are at
+  least `HUNTING`, and at least two thirds of those of any family except the heaviest;
+* else *surge, lateral, bounce, roll, pitch, yaw*: the coordinate with most energy of the family with most energy. In
+  the heaviest family, lateral motion and roll are coupled: *lower sway* about a pole below its centre of mass,
+  *upper sway* about a pole above it.
 
-Hunting is named after the heaviest family that moves at least half as much sideways as the one that moves most, what
-follows it after the heaviest that moves at least half as much in its coordinate as the one with most energy. A family's
-front and rear half move *in phase* or *in antiphase*, or one of them alone.
+Hunting is named after the heaviest family whose lateral motion is at least half of the largest lateral motion. The
+names of the last rule use the heaviest family that moves at least half as much in this coordinate as the family with
+most energy. A family's front and rear half move *in phase* or *in antiphase*, or only one of them moves.
 """
 
 import re
@@ -32,11 +33,11 @@ from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.inertia import inertia_tensors
 from wrcore.track.flexible_track import RAILS, rigid_track, track_size
 
-NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change
+NEUTRAL = 1e-3  # modulus below which an eigenvalue is neutral, 1/s: such a motion changes over a quarter of an hour
 OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
-LIGHT = 0.7  # damping ratio below which a mode can be hunting; other lateral motions of wheelsets creep back faster
-HUNTING = 0.05  # least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode
-ONE_SIDED_SHARE = 0.9  # part of a family's motion that makes the front or the rear the only one that moves
+LIGHT = 0.7  # damping ratio below which a mode can be hunting; other lateral motions of wheelsets have larger ones
+HUNTING = 0.05  # smallest fraction of energy in lateral motion and yaw of the wheelsets of a hunting mode
+ONE_SIDED_SHARE = 0.9  # fraction of a family's motion above which only the front or the rear half moves
 
 WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
 CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
@@ -44,11 +45,12 @@ Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
 
 TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
 TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
-"""Which of `TRACK` each freedom of a :class:`wrcore.track.flexible_track.FlexibleTrack` belongs to."""
+"""Index in `TRACK` of each degree of freedom of a :class:`wrcore.track.flexible_track.FlexibleTrack`."""
 
 
 def families(vehicle):
-    """Numbers of the bodies of a Vehicle that are named alike up to a number and a side, by that name in words."""
+    """Return the families of a Vehicle: numbers of the bodies whose names differ only by a number and a side, by the
+    common name in words."""
     found = {}
     for number, name in enumerate(vehicle.body_names):
         found.setdefault(re.sub(r"(_\d+)?(_left|_right)?$", "", name).replace("_", " "), []).append(number)
@@ -56,7 +58,7 @@ def families(vehicle):
 
 
 def _phase(first, second, names):
-    """How two parts move: one of them alone, by its name, or both in phase or in antiphase."""
+    """Return a text for the motion of two parts: in phase, in antiphase, or the name of the only part that moves."""
     squares = [np.sum(np.abs(part) ** 2) for part in (first, second)]
     share = squares[0] / sum(squares)
     if share > ONE_SIDED_SHARE or share < 1.0 - ONE_SIDED_SHARE:
@@ -65,7 +67,7 @@ def _phase(first, second, names):
 
 
 class _Namer:
-    """Names modes of one vehicle about one steady motion."""
+    """Function object that returns names of modes of one vehicle about one steady motion."""
 
     def __init__(self, vehicle, linearisation):
         bodies = vehicle.bodies
@@ -81,12 +83,13 @@ class _Namer:
         self.rolling = next((name for name, members in groups.items() if {*members} & {*self.wheelsets}), None)
 
     def energies(self, speed):
-        """Kinetic energies (n, 6) of the bodies' coordinates as parts of the whole."""
+        """Return kinetic energies (n, 6) of the bodies' coordinates as fractions of their total."""
         energy = self.mass * np.abs(speed) ** 2
         return energy / np.sum(energy)
 
     def __call__(self, eigenvalue, place, speed, internal):
-        """Name of a mode: displacements and velocities (n, 6) of the bodies, displacements of dampers."""
+        """Return the name of a mode from displacements and velocities (n, 6) of the bodies, and displacements of
+        dampers (``internal``)."""
         if abs(eigenvalue) < NEUTRAL:
             return "neutral"
         energies = self.energies(speed)
@@ -123,12 +126,13 @@ class _Namer:
         return bool(rolls and rolling[Y] > rolling[YAW] and leads and sideways[self.rolling] >= HUNTING)
 
     def _carrier(self, direction, speed, leaders):
-        """The heaviest family that moves at least half as much as the one of the leaders that moves most."""
+        """Return the heaviest family that moves at least half as much in a direction as the leader with the largest
+        motion."""
         moves = {name: np.max(np.abs(speed[members, direction])) for name, members in self.groups.items()}
         return next(name for name in moves if moves[name] >= 0.5 * max(moves[leader] for leader in leaders))
 
     def _with_phase(self, name, family, direction, speed):
-        """The name, and how the family's front and rear half move."""
+        """Return the name with the phase of the family's front and rear half."""
         members = np.array(self.groups[family])
         leading = self.along[members] > np.mean(self.along[members])
         if np.ptp(self.along[members]) < 1e-6:
@@ -138,7 +142,7 @@ class _Namer:
 
 
 class _Track:
-    """The track under all wheelsets in one mode: its energy, and what of it moves."""
+    """Motion of the track under all wheelsets in one mode: its energy and the fractions of its kinds of motion."""
 
     def __init__(self, support, internal):
         d, size = len(support.mass), track_size(support)
@@ -148,10 +152,11 @@ class _Track:
         self.place = rows[:, :d] if d else np.zeros((0, 0))
         weight = np.abs(self.place) ** 2 if self.massless else support.mass * np.abs(rows[:, d:]) ** 2
         self.shares = np.array([weight[:, TRACK_FREEDOMS[:d] == kind].sum() for kind in range(len(TRACK))])
-        self.energy = 0.0 if self.massless else self.shares.sum()  # twice the kinetic energy, as the namer's
+        self.energy = 0.0 if self.massless else self.shares.sum()  # twice the kinetic energy, like in `_Namer`
 
     def leads(self, eigenvalue, bodies, place):
-        """Whether the mode is the track's; energy (twice the kinetic one) and displacements of the bodies."""
+        """Whether the track dominates the mode; ``bodies`` is twice the kinetic energy of the bodies, ``place`` their
+        displacements."""
         if not self.place.size or abs(eigenvalue) < NEUTRAL:
             return False
         if not self.massless:
@@ -160,7 +165,8 @@ class _Track:
         return bool(slow and np.max(np.abs(self.place)) > np.max(np.abs(place)))
 
     def name(self):
-        """What moves, rails with their phase, and its part of the track's own energy (or squares, without mass)."""
+        """Return the kind of motion, for rails with their phase, and its fraction of the track's energy (without mass:
+        of the squared displacements)."""
         kind = int(np.argmax(self.shares))
         name, part = TRACK[kind], self.shares[kind] / self.shares.sum()
         if kind < 2:
@@ -170,15 +176,15 @@ class _Track:
 
 
 def linear_modes(vehicle, linearisation, support=None):
-    """Table of the modes of small motions of a Vehicle from its `Linearisation` (``support``: the model's track, if it
-    is flexible), their shapes and energies.
+    """Return a table of the modes of a Vehicle from its `Linearisation`, their shapes and their energies.
 
-    The table has a row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s,
-    imag_rad_per_s (not negative), frequency_Hz, damping_ratio (negative: growing, NaN: neutral), the coordinate with
-    most energy, and its part; of modes of the track, the kind of freedom and its part of the track. Shapes (rows, n,
-    6), complex: displacements (m) and rotations (rad) of the bodies, see `wrcore.balance.linear.DIRECTIONS`; the
-    largest is 1, all are 0 where only speeds change. Energies (rows, n, 6): kinetic, as parts of the whole, the track's
-    own included; of a wheelset's spin instead of its pitch.
+    ``support`` is the model's track, if it is flexible. The table has a row per real eigenvalue or conjugate pair,
+    slowest oscillation first. Columns: name, real_per_s, imag_rad_per_s (not negative), frequency_Hz, damping_ratio
+    (negative: growing, NaN: neutral), the coordinate with most energy, and its fraction. For modes of the track the
+    latter are the kind of motion and its fraction of the track's energy. Shapes (rows, n, 6), complex: displacements
+    (m) and rotations (rad) of the bodies, see `wrcore.balance.linear.DIRECTIONS`; the largest is 1, all are 0 if only
+    velocities change. Energies (rows, n, 6): kinetic, as fractions of the total, which includes the track; for
+    wheelsets the energy of spin stands in the column of pitch.
     """
     values, vectors = np.linalg.eig(linearisation.matrix)
     kept = np.flatnonzero(values.imag >= 0.0)
@@ -210,8 +216,10 @@ def linear_modes(vehicle, linearisation, support=None):
 
 
 def shape_table(vehicle, table, shapes):
-    """Shapes of :func:`modes` in a long table with a row per mode, body and coordinate: mode (row of ``table``), name,
-    body, coordinate, amplitude (m or rad, the largest in a mode is 1) and phase_rad.
+    """Return shapes of modes as a long table with a row per mode, body and coordinate.
+
+    Columns: mode (row of ``table``), name, body, coordinate, amplitude (m or rad, the largest in a mode is 1) and
+    phase_rad.
     """
     bodies = len(vehicle.body_names)
     return pd.DataFrame({
@@ -223,8 +231,9 @@ def shape_table(vehicle, table, shapes):
 
 
 def energy_table(vehicle, energies):
-    """Energies of :func:`modes` in a wide table: a row per mode, a column per family and coordinate, such as ``bogie
-    yaw`` or ``wheelset spin``, with the sum over its bodies.
+    """Return energies of modes as a wide table with a row per mode and a column per family and coordinate.
+
+    A column, such as ``bogie yaw`` or ``wheelset spin``, is the sum over the family's bodies.
     """
     columns = {}
     for family, members in families(vehicle).items():

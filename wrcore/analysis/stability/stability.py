@@ -1,4 +1,4 @@
-"""Stability of small motions over speed: root locus and linear critical speed."""
+"""Stability of small motions as a function of speed: root locus and linear critical speed."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
 from wrcore.track.track import TrackModel
 
 LARGEST_RESIDUAL = 1e-3
-"""Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
-nothing balances, is a quarter of it."""
+"""Largest residual acceleration of a steady motion, m/s^2 or rad/s^2. The unbalanced drag of a free wheelset's spin
+creepage is a quarter of it."""
 
 
 def rising(speeds):
-    """Speeds in m/s as a list; InputError if there are none, they do not rise, or one is none of a vehicle."""
+    """Return speeds, m/s, as a list; InputError if it is empty, speeds do not increase, or one is out of range."""
     speeds = [check_number(speed, 1e-6, 150.0, "speeds", "", "m/s") for speed in speeds]
     if not speeds or np.any(np.diff(speeds) <= 0.0):
         raise InputError("speeds", "", f"expected one or more that rise, got {len(speeds)}")
@@ -35,8 +35,10 @@ def rising(speeds):
 
 
 def straight_ahead(scene):
-    """Model of a scene on a tangent, perfect track, without motors, brakes and controller (they have no steady state),
-    and the state in which its vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
+    """Return the model of a scene on a tangent, perfect track, and the state of static equilibrium at the track's
+    centre.
+
+    Motors, brakes and controller are omitted, because they have no steady state. The scene's initial state is ignored.
     """
     parts: dict = {}
     model, _ = compile_scene(scene, shared=parts)
@@ -46,8 +48,10 @@ def straight_ahead(scene):
 
 
 def at_speed(model, state, speed, elapsed=0.0):
-    """Model and state of the same motion on a tangent track at another speed (m/s) of the moving frame: bodies move as
-    before relative to it, wheelsets spin faster in proportion. ``elapsed`` (s): time of the state; the new one is 0.
+    """Return model and state of a motion on a tangent track, converted to another speed (m/s) of the moving frame.
+
+    Velocities of bodies relative to the frame are kept; the spin of wheelsets is scaled with the speed. ``elapsed`` (s)
+    is the time of the given state; that of the new state is 0.
     """
     state = state.copy()
     for body, part in enumerate(state[: STATE_SIZE * len(model.bodies.mass)].reshape(-1, STATE_SIZE)):
@@ -60,8 +64,9 @@ def at_speed(model, state, speed, elapsed=0.0):
 
 
 def steady_motion(model, state, speed):
-    """`Linearisation` about steady running on a tangent track at a speed (m/s), found from a state near its centre at
-    the model's speed; InputError if there is none.
+    """Return the `Linearisation` about steady running on a tangent track at a speed (m/s).
+
+    The steady motion is found from a state near the track's centre at the model's speed; InputError if there is none.
     """
     motion = steady_running(*at_speed(model, state, speed))
     left = np.abs(motion.residual)
@@ -69,7 +74,7 @@ def steady_motion(model, state, speed):
         bodies = len(model.bodies.mass)
         whole, inner = np.split(np.abs(motion.basis @ motion.residual)[6 * bodies :], [6 * bodies])
         whole = whole.reshape(bodies, 6)
-        whole[:, 0], whole[model.bodies.spins == 1, 4] = 0.0, 0.0  # along the track, and the spin that belongs to it
+        whole[:, 0], whole[model.bodies.spins == 1, 4] = 0.0, 0.0  # along the track, and the corresponding spin
         held = "" if max(np.max(whole), np.max(inner, initial=0.0)) >= LARGEST_RESIDUAL else (
             ", along the track, where nothing holds the vehicle against its rolling resistance: an element or joint"
             " between a body and the frame would"
@@ -83,21 +88,21 @@ def steady_motion(model, state, speed):
 
 @checked
 def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Modes of a scene's vehicle at one speed, with their energies and shapes.
+    """Compute the modes of a scene's vehicle at one speed, with their energies and shapes.
 
     Parameters
     ----------
     scene : Scene, path or dict
-        Its path, gradients, irregularity, drive and control do not count.
+        Its path, gradients, irregularity, drive and control are ignored.
     speed : float
-        m/s.
+        Speed, m/s.
 
     Returns
     -------
     table : pandas.DataFrame
-        That of `wrcore.analysis.stability.modes.linear_modes`, followed by the columns of `energy_table`.
+        Table of `wrcore.analysis.stability.modes.linear_modes`, followed by the columns of `energy_table`.
     shapes : pandas.DataFrame
-        From `shape_table`.
+        Table of `shape_table`.
 
     Examples
     --------
@@ -114,13 +119,14 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def root_locus(vehicle, model, state, speeds):
-    """Tables of `linear_modes` at ``speeds`` (m/s) below each other, after a column speed_m_per_s; other arguments as
-    for `steady_motion`.
+    """Return one table with the modes of `linear_modes` at all ``speeds`` (m/s), after a column speed_m_per_s.
+
+    The other arguments are those of `steady_motion`.
     """
     tables = []
     for speed in speeds:
         motion = steady_motion(model, state, speed)
-        model, state = model._replace(speed=float(speed)), motion.state  # the next one is found from here at once
+        model, state = model._replace(speed=float(speed)), motion.state  # initial guess for the next speed
         table, _, _ = linear_modes(vehicle, motion, model.flexible_track)
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
@@ -128,23 +134,25 @@ def root_locus(vehicle, model, state, speeds):
 
 
 def growth(motion):
-    """Largest real part of all eigenvalues of a `Linearisation` that are not neutral, 1/s."""
+    """Return the largest real part of all eigenvalues of a `Linearisation` that are not neutral, 1/s."""
     values = np.linalg.eigvals(motion.matrix)
     return float(np.max(values.real[np.abs(values) >= NEUTRAL]))
 
 
 def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
-    """Linear critical speed: the lowest at which a small motion neither grows nor dies away, to ``tolerance`` (m/s),
-    sought at rising ``speeds`` (m/s) first; other arguments as for `steady_motion`.
+    """Return the linear critical speed: the lowest speed at which a small motion neither grows nor decays.
 
-    Dict of critical_speed_m_per_s and name, frequency_Hz and wavelength_m of the mode that loses its stability. Minus
-    infinity if the lowest speed is unstable, infinity if none is; then without a mode.
+    It is bracketed at increasing ``speeds`` (m/s) and then located to ``tolerance`` (m/s). The other arguments are
+    those of `steady_motion`. The result is a dict of critical_speed_m_per_s, and mode (name), frequency_Hz and
+    wavelength_m of the mode that becomes unstable. The speed is minus infinity if the lowest speed is unstable,
+    infinity if none is unstable; then there is no mode.
     """
     nothing = {"mode": "", "frequency_Hz": np.nan, "wavelength_m": np.nan}
     before, motions = None, {}
 
     def growth_at(speed):
-        """Each speed once; the steady motion of the last one is where that of the next is looked for."""
+        """Return the growth at a speed, 1/s; each steady motion is computed once and is the initial guess of the
+        next."""
         nonlocal model, state
         if speed not in motions:
             motions[speed] = steady_motion(model, state, speed)
@@ -173,14 +181,14 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
 
 @checked
 def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], speeds: Iterable[float]) -> pd.DataFrame:
-    """Linear critical speed of a scene's vehicle, or of one in several scenes.
+    """Compute the linear critical speed of a scene's vehicle, or of the vehicles of several scenes.
 
     Parameters
     ----------
     scenes : Scene or path, or dict of str to Scene
-        Several by what they differ in. Paths, gradients, irregularity, drive and control do not count.
+        A scene, or several by the name of the variant. Path, gradients, irregularity, drive and control are ignored.
     speeds : sequence of float
-        Rising, m/s: the critical speed is looked for between them.
+        Increasing speeds, m/s; the critical speed is searched between them.
 
     Returns
     -------
