@@ -1,11 +1,11 @@
 """Rolling contact fatigue: damage by the wear number, and the index of surface fatigue on the shakedown map.
 
-Sources, recalled, not read. Damage per passage over T gamma, whole life rail model: Burstow (RSSB, 2003/2004): none
-below 15 N, most, 1e-5, at 65 N, none at 175 N, beyond which wear takes cracks away faster than they grow (0 here; the
-model's negative branch is left out). Index of surface fatigue: Ekberg, Kabo and Andersson, Fatigue and Fracture of
-Engineering Materials and Structures 25 (2002) 899-909: FI = |T|/N - 2 pi a b k/(3 N) = |T|/N - k/p_max, above 0 where
-the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24). Both belong to a patch;
-a wheel has those of its worst one.
+Sources are recalled, not read. Damage per passage over T gamma, whole life rail model: Burstow (RSSB, 2003/2004). It is
+zero below 15 N, has its maximum, 1e-5, at 65 N and is zero at 175 N. Beyond, wear removes cracks faster than they grow
+(0 here; the model's negative branch is omitted). Index of surface fatigue: Ekberg, Kabo and Andersson, Fatigue and
+Fracture of Engineering Materials and Structures 25 (2002) 899-909: FI = |T|/N - 2 pi a b k/(3 N) = |T|/N - k/p_max. It
+is positive where the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24). Both
+apply to a patch; for a wheel the worst patch is used.
 """
 
 from __future__ import annotations
@@ -29,29 +29,32 @@ from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.output.run import Run
 
-YIELD_IN_SHEAR = 300e6  # of a wheel or rail steel that has hardened, Pa (chosen)
+YIELD_IN_SHEAR = 300e6  # shear yield stress of a work-hardened wheel or rail steel, Pa (chosen)
 BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)  # whole life rail model: N, and damage per passage
 
 
 def rcf_damage(wear_number):
-    """Share (1e-5 at most) of the life to first cracks that a passage with T gamma (N) takes; 0 where wear prevails."""
+    """Return the fraction (at most 1e-5) of the life to first cracks consumed by a passage with T gamma (N); 0 where
+    wear prevails."""
     return np.interp(wear_number, BREAKS, DAMAGE)
 
 
 def utilised_friction(run, wheelset, side):
-    """|T|/N of a wheel's patches over time, shape (n, patches); NaN without contact."""
+    """Return the utilised friction |T|/N of a wheel's patches over time, shape (n, patches); NaN without contact."""
     c = run[f"{wheelset}/{side}"]
     return np.hypot(c.Fx_N, c.Fy_N) / np.where(c.N_N > 0.0, c.N_N, np.nan)
 
 
 def passage_damage(run, wheelset, side):
-    """Damage of a passage (`rcf_damage`) under a wheel's worst patch over time, shape (n,); 0 without contact."""
+    """Return the damage of a passage (`rcf_damage`) by a wheel's worst patch over time, shape (n,); 0 without
+    contact."""
     c = run[f"{wheelset}/{side}"]
     return np.max(rcf_damage(np.nan_to_num(np.abs(c.Fx_N * c.xi + c.Fy_N * c.eta))), axis=1)
 
 
 def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
-    """FI (n,), index of surface fatigue, of a wheel's worst patch, k = ``shear_yield`` (Pa); -inf without contact."""
+    """Return the index of surface fatigue FI (n,) of a wheel's worst patch; k is ``shear_yield`` (Pa); -inf without
+    contact."""
     index = utilised_friction(run, wheelset, side) - shear_yield / run[f"{wheelset}/{side}"].p_max_Pa
     return np.max(np.where(np.isnan(index), -np.inf, index), axis=1)
 
@@ -60,7 +63,7 @@ def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
 def damage_table(
     run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR
 ) -> pd.DataFrame:
-    """Rolling contact fatigue of each wheel and the rail under it over a run.
+    """Return measures of rolling contact fatigue of each wheel and the rail under it over a run.
 
     Parameters
     ----------
@@ -68,19 +71,19 @@ def damage_table(
     begin : float
         Start of the evaluation, s.
     shear_yield : float
-        k, Pa.
+        Shear yield stress k, Pa.
 
     Returns
     -------
     pandas.DataFrame
-        A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share of the way with
-        FI above 0, p_max_Pa. Damage and FI are those of the worst patch at each time; T gamma is the sum over patches.
-        Means are over the way: those of the rail's places.
+        A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share_above_shakedown
+        (fraction of the distance with FI above 0), p_max_Pa. Damage and FI are those of the worst patch at each time; T
+        gamma is the sum over patches. Means are over the distance, so that they apply to positions on the rail.
 
     Raises
     ------
     InputError
-        For a run without wheels, or nothing after ``begin``.
+        If the run has no wheels, or ``begin`` is outside the run.
 
     Examples
     --------
@@ -108,12 +111,12 @@ def damage_table(
 @checked
 @styled
 def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR) -> Figure:
-    """Shakedown map: greatest pressure over k against utilised friction, all patches and times.
+    """Draw the shakedown map: maximum pressure over k against utilised friction, for all patches and times.
 
     Parameters
     ----------
     run, begin, shear_yield
-        As for `damage_table`.
+        Arguments of `damage_table`.
 
     Returns
     -------

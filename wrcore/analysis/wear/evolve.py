@@ -1,15 +1,15 @@
-"""Wheel profiles over a distance: simulate, add wear, go on with the worn profile.
+"""Evolution of wheel profiles by wear over a distance: simulate, add wear, repeat with the worn profile.
 
-A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
-wheel profile, averages the depths that all wheels lose (`local_wear`), smooths them and goes on
-over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
-curves to both sides. At ``limits`` the wheel ends, or is turned to its new profile. Rails stay as they are, a wheel
-sees all of a line and a rail all vehicles, unless the plan says how much traffic wears them
-(:mod:`wrcore.analysis.wear.worn_rails`).
+A plan names a scene and variants of it with their shares of the distance. Each step simulates them with the present
+wheel profile, averages the wear depths of all wheels (`local_wear`) and smooths them. The length of the step is the
+distance after which the largest depth is ``largest_wear``. All wheels, left and right, have the same wear, because
+lines have curves to both sides. At ``limits`` the evolution ends, or the wheel is turned to its new profile. Rails do
+not wear, because a wheel runs on the whole line and a rail carries all vehicles, unless the plan defines the traffic
+that wears them (:mod:`wrcore.analysis.wear.worn_rails`).
 
-A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
-step. ``plan.json`` holds their digests: a step counts when that of its row is there; whoever is killed goes on after
-the last one; what was edited or damaged since is refused.
+A folder contains the state: the profile at the start of each step, the wear of the rails, and a table with a row per
+step. ``plan.json`` contains their digests. A step is complete when the digest of its row is stored. After an
+interruption the evolution continues after the last complete step. Edited or damaged files are refused.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ from wrcore.scene.description import Scene, changed_by_file, load_scene
 from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
 
-AMPLITUDE = 3e-3  # of the equivalent conicity in the table, m
-MT = 1e9  # a million gross tonnes, kg
+AMPLITUDE = 3e-3  # amplitude of the equivalent conicity in the table, m
+MT = 1e9  # mass of a million gross tonnes, kg
 
 MOST_STEPS = 10_000
 
@@ -56,9 +56,10 @@ MOST_STEPS = 10_000
 def load_wear_plan(
     source: str | PathLike[str] | dict[str, Any], changes: dict[str, Any] | None = None
 ) -> tuple[dict[str, Any], list[Scene]]:
-    """Read and check a plan (a file by the schema ``wear.yaml``, or its content, with paths from the working
-    directory), ``changes`` replacing its keys, of ``set`` those that they name: its data with defaults, and its scenes
-    in order.
+    """Read and check a plan; return its data with defaults, and its scenes in order.
+
+    The source is a file (schema ``wear.yaml``), or its content with paths relative to the working directory.
+    ``changes`` replace keys of the plan; of ``set`` they replace only the keys that they name.
     """
     name, folder, data = read_source(source, "plan")
     changes = changes or {}
@@ -98,8 +99,8 @@ def load_wear_plan(
 
 
 def _check_sets(stated, data, name):
-    """InputError where the ``set`` that the plan's file states, and that of a scene, have the same key; or where one of
-    them has a key that the plan has by another name."""
+    """Raise InputError if the ``set`` in the plan's file and that of a scene have a key in common, or if one of them
+    has a key that the plan sets by another name."""
     fixed = {"output.rate": "the plan's key rate is the output rate of its runs"}
     if data["patches"] == "exact":
         fixed["output.channels"] = "exact patches need channels of their own"
@@ -119,7 +120,7 @@ def _keys_of_changes(values):
 
 
 def _check_wheels(scenes, name):
-    """InputError where wheels have different profiles: all wear alike, from that of the first scene on."""
+    """Raise InputError if wheels have different profiles: all start from that of the first scene and wear equally."""
     first = scenes[0].data["wheel"]["profile"]
     for i, scene in enumerate(scenes):
         wheel = scene.data["wheel"]
@@ -134,7 +135,7 @@ def _check_wheels(scenes, name):
 
 
 def _check_limits(data, wheel, name):
-    """InputError for turning without a limit, and for limits that a new wheel has reached or that it cannot reach."""
+    """Raise InputError for turning without a limit, and for limits that a new wheel has reached or cannot reach."""
     limits = data["limits"]
     if data["turning"] and not limits:
         raise InputError(name, "turning", "expected limits beside turning, as a wheel is turned at a limit")
@@ -160,7 +161,7 @@ def evolve(
     threads: Threads = 1,
     spent: MutableMapping[str, float] | None = None,
 ) -> pd.DataFrame:
-    """Wear a wheel profile over the distance of a plan, or go on with it.
+    """Compute the wear of a wheel profile over the distance of a plan, or resume an interrupted computation.
 
     Parameters
     ----------
@@ -168,28 +169,28 @@ def evolve(
     changes : dict, optional
         See `load_wear_plan`.
     folder : path-like
-        Of ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` takes them),
+        Folder for ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` reads them),
         ``rails_000.csv`` and so on (see `rail_wear`) and ``steps.csv``; created if needed.
     say : callable, optional
         Called with a line after each step.
     threads : int
-        Scenes of a step that run at the same time; of no influence on the result.
+        Number of scenes of a step that run at the same time; the result does not depend on it.
     spent : mutable mapping, optional
-        Filled: processor time of all runs (``simulate``) and of their local wear (``wear``), s.
+        Filled with the processor time of all runs (``simulate``) and of their local wear (``wear``), s.
 
     Returns
     -------
     pandas.DataFrame
         ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (largest
         depth, normal to the profile, m per m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step),
-        at_limit (limits reached: no step from there, and the next row's wheel is turned, if any follows). The last row
-        is the end: its profile, and no step.
+        at_limit (number of limits reached: then the row has no step, and the wheel of a next row is turned). The last
+        row has the profile at the end, and no step.
 
     Raises
     ------
     InputError
-        For a bad plan, a folder of another plan or of other input files, one whose files were changed, one that another
-        process writes to, or a run that left the rails or failed.
+        If the plan is invalid, the folder belongs to another plan or other input files, its files were changed, another
+        process writes to it, or a run derailed or failed.
 
     Examples
     --------
@@ -247,15 +248,16 @@ def _evolve(data, scenes, folder, say, threads, spent):
 
 
 def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Distance (m), u and f (m) at the start of each step in a folder of `evolve`."""
+    """Return the distance (m) and the profile's u and f (m) at the start of each step in a folder of `evolve`."""
     folder = Path(folder)
     return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in rows_of(folder)]
 
 
 def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
-    """What the vehicle of a plan takes off the rails of its scenes, from a folder of `evolve`: a row per step and scene
-    with step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and right_m2_per_Mt, the area that the
-    rail's section loses per million gross tonnes of such vehicles.
+    """Return the wear of the rails by the vehicle of a plan, from a folder of `evolve`, with a row per step and scene.
+
+    Columns: step, distance_m, scene (its index in the plan), share, left_m2_per_Mt and right_m2_per_Mt, the area that
+    the rail's section loses per million gross tonnes of such vehicles.
     """
     folder = Path(folder)
     parts = [
@@ -268,8 +270,10 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
 
 
 def profile_row(scene, folder, step, gone):
-    """What the table says of the profile at the start of a step: worn_m (deepest loss of the ordinate since new or
-    turned), flange measures Sh_m, Sd_m, qR_m (EN 15313, recalled), hollow_m and equivalent_conicity (3 mm).
+    """Return the columns of the table that describe the profile at the start of a step.
+
+    They are worn_m (largest loss of the ordinate relative to the new or turned profile), flange dimensions Sh_m, Sd_m,
+    qR_m (EN 15313, recalled), hollow_m and equivalent_conicity (3 mm).
     """
     u, now = read_points(file_of(folder, "profile", step))
     with untold():
@@ -285,56 +289,58 @@ def profile_row(scene, folder, step, gone):
 
 
 def _goes_on(data, row):
-    """Whether a step follows: there was one, or the wheel is turned and there is a way left."""
+    """Whether another row follows: the last row had a step, or its wheel is turned before the end of the distance."""
     if row["at_limit"]:
         return data["turning"] and data["distance"] - row["distance_m"] > 1e-9 * data["distance"]
     return row["step_m"] > 0.0
 
 
 def _step_length(data, gone, worn):
-    """How far the rates of a step hold, m."""
+    """Return the length of a step, m, over which its wear rates are used."""
     length = min(data["distance"] - gone, worn_rails.to_renewal(gone, data["rails"].get("renewal")))
     return min(length, data["largest_step"], data["largest_wear"] / worn.fastest) if worn.volume else length
 
 
 class StepWear(NamedTuple):
-    """What all scenes of a step take off."""
+    """Wear rates of a step, over all its scenes."""
 
     rise: np.ndarray
-    """Of a wheel's ordinate at the stored points, smoothed, m per m."""
+    """Increase of a wheel's ordinate at the stored points, smoothed, m per m."""
     volume: float
-    """m^3 per m of a wheel."""
+    """Volume lost by a wheel, m^3 per m."""
     falls: list[dict[str, np.ndarray]]
-    """Of each scene's rails at their stored points, smoothed, m per m that the vehicle runs; none unless rails wear."""
+    """Decrease of the ordinates of each scene's rails at their stored points, smoothed, m per m that the vehicle runs;
+    empty unless rails wear."""
     deepest: float
     """Largest loss normal to the wheel's profile, m per m."""
     fastest: float
-    """The same of wheels and rails."""
+    """Largest loss normal to the profiles of wheels and rails, m per m."""
 
 
 STILL, UNWORN = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0), [dict.fromkeys(SIDES, 0.0)]
-"""A step of no length, and what it takes off the rails of a scene."""
+"""Wear rates of a step of zero length, and those of the rails of a scene."""
 
 
 class SceneWear(NamedTuple):
-    """What a run of a scene takes off."""
+    """Wear rates in a run of one scene."""
 
     rise: np.ndarray
-    """Of a wheel's ordinate at the stored points, m per m, mean of all wheels."""
+    """Increase of a wheel's ordinate at the stored points, m per m, mean of all wheels."""
     volume: float
-    """m^3 per m of a wheel."""
+    """Volume lost by a wheel, m^3 per m."""
     rails: dict[str, float]
-    """Area of each rail's section, m^2 per million gross tonnes."""
+    """Area lost by each rail's section, m^2 per million gross tonnes."""
     falls: dict[str, np.ndarray]
-    """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
+    """Decrease of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails
+    wear."""
     laid: worn_rails.RailsOfStep | None
     """The rails, if they wear."""
     seconds: tuple[float, float]
-    """Processor time of simulating and of local wear."""
+    """Processor time of the simulation and of local wear, s."""
 
 
 def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
-    """`StepWear` of the profile (u and f) at the start of a step."""
+    """Return the `StepWear` of the profile (u and f, m) at the start of a step."""
     one = partial(_scene_wear, data, folder, step, profile[0], threads > 1)
     total, volume, fastest = np.zeros(len(profile[0])), 0.0, 0.0
     rails: list[dict[str, float]] = []
@@ -391,7 +397,7 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
 
 
 def plan_mark(data, scenes):
-    """What a folder belongs to: a digest of plan, scenes, all files that they read, version, and the rails' form."""
+    """Return the digest that identifies a folder: plan, scenes, all files read, version, and constants of rails."""
     files = {path: digest for scene in scenes for path, digest in scene.files.items()}
     form = [getattr(worn_rails, name) for name in ("POINTS", "FACE", "FACE_SLOPE", "EDGE", "PASSES")]
     return digest_of_plan([data, [scene.data for scene in scenes], *(form if data["rails"] else [])], files)

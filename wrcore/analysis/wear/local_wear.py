@@ -1,18 +1,19 @@
-"""Local wear of wheels and rails over a run: where in the patches friction works, and what that takes off.
+"""Local wear of wheels and rails over a run: distribution of frictional work in the patches, and the material removed.
 
-Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
-local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.output.derived`). Or the real patch says it, solved exactly where the wheel was
-and as it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend, scaled
-by one factor a wheel. A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is lost per metre rolled and
-area of contact.
+For each patch at each output time, FASTSIM computes the distribution of frictional work: q = tau s, the tangential
+traction times the local slip, N/m^2, per metre rolled. It is scaled by one factor a patch, so that its integral is the
+creep work of the run's forces and creepages (:mod:`wrcore.run.output.derived`). Alternatively q is that of the exact
+patch for the position and velocity of the wheel in the run (:mod:`wrcore.analysis.contact.in_run`), strip by strip
+along both curved profiles, scaled by one factor a wheel. A wear law (:mod:`wrcore.analysis.wear.wear_laws`) converts q
+to the loss per metre rolled and area of contact.
 
-A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
+A point of a wheel passes the patch once a revolution, a point of a rail once a passage. A strip of the patch with known
+q thus removes
 
     I = integral of (volume lost) dx: depth per passage of a rail;   I/(2 pi r): depth per metre run of a wheel
 
-and leaves it spread over the width of the strip. Means are over the way that is run. Depths are those of the profile's
-ordinate, volumes exact sums.
+evenly over the width of the strip. Means are over the distance run. Depths are changes of the profile's ordinate,
+volumes are exact sums.
 """
 
 from __future__ import annotations
@@ -41,17 +42,17 @@ from wrcore.scene.friction import read_friction
 from wrcore.scene.stored import laws_of_stored
 
 PATCHES = "ellipse", "exact"
-"""Where friction works."""
+"""Patch models for the distribution of frictional work."""
 
 BIN = 2.5e-4  # width of the bins of depth over a profile, m
-STRIPS, STEPS = 25, 20  # strips across and steps along a patch
+STRIPS, STEPS = 25, 20  # numbers of strips across and of steps along a patch
 
 MISSED = 0.1
-"""Share of a wheel's force that its exact patches may miss; else ellipses stand in at that time."""
+"""Largest relative error of a wheel's force carried by its exact patches; above it, ellipses are used at that time."""
 
 _SOUGHT = 1
-"""Steps for which windows of exact patches are sought, that is from the first guess alone: in worn gauge corners fixed
-strips err no more than what longer searches find."""
+"""Number of steps of the search for windows of exact patches, which uses only the first guess: in worn gauge corners
+fixed strips do not have larger errors than results of longer searches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,16 +71,16 @@ class WheelWear:
     """
 
     wheel_edges: np.ndarray
-    """(n + 1,): m."""
+    """Edges of the bins, shape (n + 1,), m."""
     wheel_depth: np.ndarray
-    """(n,): by which the ordinate rises, m per metre run."""
+    """Increase of the ordinate, shape (n,), m per metre run."""
     rail_edges: np.ndarray
     rail_depth: np.ndarray
-    """By which the ordinate falls, m per passage of this wheel."""
+    """Decrease of the ordinate, m per passage of this wheel."""
     volume: float
-    """What wheel and rail lose each, m^3 per metre run."""
+    """Volume that wheel and rail lose each, m^3 per metre run."""
     work: float
-    """Friction's work in the patches, J/m."""
+    """Frictional work in the patches, J/m."""
 
 
 @checked
@@ -93,29 +94,29 @@ def local_wear(
     scene: Source | None = None,
     trust: bool = False,
 ) -> dict[tuple[str, str], WheelWear]:
-    """Local wear of all wheels and their rails over a run.
+    """Compute the local wear of all wheels and their rails over a run.
 
     Parameters
     ----------
     run : Run
-        With the contact channels.
+        Run with the contact channels.
     begin : float
         Start of the evaluation, s.
     law : {"sheffield", "energy"} or mapping
         See :func:`wrcore.analysis.wear.wear_laws.wear_law`.
     width : float
-        Of the bins, 1e-6 to 0.1 m.
+        Width of the bins, 1e-6 to 0.1 m.
     patches : {"ellipse", "exact"}
-        Where friction works: over the ellipses of equal moments, or over the real patches, solved anew, some
-        milliseconds each. These want the channels ``wheel_motion`` of a run with ``contact.patch`` exact or tabulated,
-        whose motion is theirs, or moment, whose motion is near it (`reports/wear.md` says how near); laws are then
+        Distribution of frictional work: over the ellipses of equal moments, or over exact patches, which are solved
+        again in some milliseconds each. Exact patches need the channels ``wheel_motion``. ``contact.patch`` of the run
+        must be exact or tabulated, or moment, whose motion is similar (see `reports/wear.md`). Laws are then
         "sheffield" and "energy".
     resolution : {"coarse", "middle", "fine"}
-        Of exact patches.
+        Resolution of exact patches.
     scene : Scene, str, Path or dict, optional
-        That of the run, for exact patches; left out: read anew by what the run says of it.
+        Scene of the run, for exact patches; by default it is read again from the description in the run.
     trust : bool
-        Whether laws of the user that a run file names may be run: exact patches ask for friction that falls with slip.
+        Whether laws of the user that a run file names may be executed: exact patches need slip-dependent friction.
 
     Returns
     -------
@@ -125,8 +126,8 @@ def local_wear(
     Raises
     ------
     InputError
-        For an unknown law, a run without wheels or their contacts, nothing after ``begin``, Archard's law with
-        friction that is not one number, or what exact patches do not take.
+        If the law is unknown, the run has no wheels or contacts, ``begin`` is outside the run, friction is not one
+        number with Archard's law, or exact patches do not support the law or the scene.
 
     Examples
     --------
@@ -156,7 +157,7 @@ def local_wear(
 
 
 def check_motion(scene: Scene, asker: str) -> None:
-    """An InputError in the name of the ``asker`` for a scene whose motion is not near that of exact contact."""
+    """Raise InputError, named by ``asker``, for a patch model whose motion is not similar to that of exact contact."""
     own = scene.data["contact"]["patch"]
     if own == "maximum":
         expected = "expected exact, tabulated or moment where patches are exact: others move a wheelset in another way"
@@ -164,35 +165,36 @@ def check_motion(scene: Scene, asker: str) -> None:
 
 
 def law_on_cells(law: str | dict[str, Any], asker: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Loss (kg per metre rolled and m^2) over friction's work per area on exact patches; an InputError for what these
-    do not take, in the name of the ``asker``."""
+    """Return the function from frictional work per area to loss (kg per metre rolled and m^2) on exact patches.
+
+    InputError, named by ``asker``, for laws that exact patches do not support."""
     if not isinstance(law, str) or law not in LAWS:
         raise InputError(asker, "law", f"{one_of(LAWS, law)}, where patches are exact")
     return LAWS[law]
 
 
 class Strips(NamedTuple):
-    """What strips of patches lose, over all output times that count; (k,) each."""
+    """Material loss and work of strips of patches, over all evaluated output times; arrays of shape (k,)."""
 
     time: np.ndarray
-    """Number of the output time among those."""
+    """Index of the output time among the evaluated ones."""
     wheel: np.ndarray
     rail: np.ndarray
-    """(2, k): ends on the profiles, m."""
+    """Ends of the strips on the profiles of wheel and rail, shape (2, k), m."""
     lost: np.ndarray
-    """Volume per metre rolled, m^2."""
+    """Volume lost per metre rolled, m^2."""
     work: np.ndarray
-    """Friction's, N."""
+    """Frictional work per metre rolled, N."""
 
 
 NOTHING = Strips(np.zeros(0, int), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0), np.zeros(0))
-"""Of a wheel in the air."""
+"""`Strips` of a wheel without contact."""
 
 _WORKING = "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"
 
 
 def _wheel_wear(run, name, late, strips, width):
-    """`WheelWear` of the strips of a wheel."""
+    """Return the `WheelWear` of a wheel from its `Strips`, with bins of a ``width`` (m)."""
     share, radius = way_shares(run, name, late)[strips.time], run[name]["z_m"][late][strips.time]
     lost = strips.lost * share
 
@@ -205,12 +207,12 @@ def _wheel_wear(run, name, late, strips, width):
 
 
 def _friction_of(scene, trust):
-    """Largest friction of a run that does not say it."""
+    """Return the largest coefficient of friction of a scene, for runs that do not store it."""
     return read_friction(scene["contact"]["friction"], "scene", laws_of_stored(scene, trust)).largest
 
 
 def _on_ellipses(run, late, loss, trust, name, side):
-    """`Strips` of the ellipses of a wheel."""
+    """Return the `Strips` of the ellipses of a wheel."""
     contact, body, outwards, scene = run[f"{name}/{side}"], run[name], SIDES[side], run.scene
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
@@ -229,8 +231,9 @@ def _on_ellipses(run, late, loss, trust, name, side):
 
 
 def _on_exact_patches(run, late, law, scene, resolution, name, side, otherwise):
-    """`Strips` of the exact patches of a wheel, by a law over friction's work; some of those ``otherwise`` where exact
-    patches do not carry the wheel."""
+    """Return the `Strips` of the exact patches of a wheel, with a law over frictional work.
+
+    At times at which exact patches do not carry the wheel's force, `Strips` of ``otherwise`` are used."""
     solved, parts, missed = WheelInRun(run, scene, name, side, resolution, "local_wear", _SOUGHT), [], []
     known = creep_work(*(run[f"{name}/{side}"][part] for part in _WORKING))[2]
     for time, i in enumerate(np.flatnonzero(late).tolist()):
@@ -240,7 +243,7 @@ def _on_exact_patches(run, late, law, scene, resolution, name, side, otherwise):
             continue
         total = sum(float(one.patch.friction_work @ one.patch.cell_area) for one in found)
         for patch, places in ((one.patch, one.places) for one in found if total > 0.0):
-            if places is None:  # on a grid, whose plane is flat
+            if places is None:  # on a grid, which is plane
                 places = _on_plane(patch, run[f"{name}/{side}"], i)
             area, work = patch.cell_area, patch.friction_work * max(known[i], 0.0) / total
             count = places.shape[-1]
@@ -259,9 +262,11 @@ _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m
 
 
 def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, steps=STEPS):
-    """Friction's work over m patches (``rows``: channels a_m to phi_per_m, shapes (m,); modulus in Pa) by FASTSIM:
-    middles of the strips y (m, strips), their width dy (m, 1), length of the steps dx (m, strips), all m, and work
-    (m, strips, steps) per metre rolled and area, N/m^2, from the leading edge on.
+    """Compute the frictional work over m patches by FASTSIM.
+
+    ``rows`` are channels a_m to phi_per_m, shapes (m,); the modulus is in Pa. Return middles of the strips y (m,
+    strips), their width dy (m, 1), length of the steps dx (m, strips), all m, and work (m, strips, steps) per metre
+    rolled and area, N/m^2, from the leading edge on.
     """
     a, b, load, xi, eta, phi = (rows[name][:, None] for name in ("a_m", "b_m", "N_N", "xi", "eta", "phi_per_m"))
     data = kalker_data(poisson_ratio)
@@ -279,7 +284,7 @@ def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, s
         size = np.hypot(px, py)
         most = bound * (length * length - x * x) / (a * a)
         cut = np.divide(most, size, out=np.ones(size.shape), where=size > most)
-        # what is cut back is what slides: traction times slip, with the softness along the direction of the traction
+        # work of slip: the excess traction times softness is the slip, both along the direction of the traction
         lost = (1.0 - cut) * (softness[0] * px * px + softness[1] * py * py)
         px, py = px * cut, py * cut
         work[..., k] = cut * lost / dx
@@ -291,7 +296,8 @@ def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, s
 
 
 def _on_plane(patch, contact, i):
-    """As `Found.places` of the cells of a grid, about the patch of the run at the i-th output time that leans as it."""
+    """Return `Found.places` of the cells of a grid, relative to the run's patch at the i-th output time with the
+    nearest contact angle."""
     k, outwards = int(np.nanargmin(np.abs(contact["contact_angle_rad"][i] - patch.contact_angle))), SIDES[patch.side]
     aside = outwards * (patch.s - patch.centroid[1]) * np.cos(patch.contact_angle)
     ends = aside + 0.5 * np.cos(patch.contact_angle) * np.array([-patch.ds, patch.ds])
@@ -299,7 +305,7 @@ def _on_plane(patch, contact, i):
 
 
 def _gathered(low, high, amount, width):
-    """Bins of a width that hold amounts spread evenly from ``low`` to ``high``: edges, and what is in each."""
+    """Distribute amounts evenly from ``low`` to ``high`` over bins of a ``width``; return edges and amounts of bins."""
     if amount.size == 0:
         return np.array([0.0, width]), np.zeros(1)
     first = np.floor(low.min() / width)

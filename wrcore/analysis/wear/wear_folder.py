@@ -1,4 +1,4 @@
-"""The folder of a wear plan: which steps count, and the digests of the files that they rest on."""
+"""Folder of a wear plan: its completed steps, and the digests of the files on which they depend."""
 
 import hashlib
 import io
@@ -14,7 +14,7 @@ TABLE, PLAN = "steps.csv", "plan.json"
 
 
 def claim(folder, mark, plan):
-    """Take a folder for a plan of a mark, or refuse one that holds another."""
+    """Reserve a folder for the plan with the digest ``mark``, or refuse a folder of another plan."""
     if not any((folder / name).exists() for name in (PLAN, TABLE)):
         _write_plan(folder, {"digest": mark, "plan": plan, "files": {}})
     elif _read_plan(folder)["digest"] != mark:
@@ -39,7 +39,7 @@ def _write_plan(folder, plan):
 
 
 def rows_of(folder):
-    """Rows of the steps that count; InputError where a file is no longer what was written, or nobody knows."""
+    """Return the rows of completed steps; InputError if a file differs from its digest."""
     path, files = folder / TABLE, _read_plan(folder)["files"]
     if not files:
         return []
@@ -47,7 +47,7 @@ def rows_of(folder):
     try:
         check_regular(path)
         table = path.read_text(encoding="utf-8")
-        before = table[: table.rfind("\n", 0, -1) + 1]  # the last row may have been written, and not count yet
+        before = table[: table.rfind("\n", 0, -1) + 1]  # the last row may be written, but not completed
         table = next(text for text in (table, before) if _digest(text) == files[TABLE])
         rows = pd.read_csv(io.StringIO(table)).to_dict("records")
     except (OSError, ValueError, KeyError, StopIteration):
@@ -63,7 +63,7 @@ def _digest(text):
 
 
 def write_rows(folder, rows):
-    """Write the table, and make its last row count, with the files of its step and of the next one."""
+    """Write the table and complete its last row: store the digests of the files of its step and of the next step."""
     text, step, plan = pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"), len(rows) - 1, _read_plan(folder)
     with appearing(folder / TABLE) as file:
         file.write(text.encode())

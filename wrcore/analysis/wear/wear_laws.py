@@ -1,21 +1,21 @@
-"""Wear laws: what friction's work in a patch takes off, m^3 per metre rolled and m^2 of contact.
+"""Wear laws: volume of material that frictional work in a patch removes, m^3 per metre rolled and m^2 of contact.
 
 With q the work (N/m^2 per metre rolled), p the pressure, s the slip (-) and V the rolling speed:
 
 * ``sheffield``: loss of mass over q in three branches. Wear rate over T gamma/A of the University of Sheffield, steel
-  R8T on 900A: Braghin, Lewis, Dwyer-Joyce and Bruni, Wear 261 (2006) 1253-1264; 5.3, 10.4, 55.12, 77.2 and 61.9
-  recalled and found alike in a public code, the third branch joined to the second without a step (as printed it begins
-  at zero).
-* ``energy``: the first branch alone, loss in proportion to friction's work.
+  R8T on 900A: Braghin, Lewis, Dwyer-Joyce and Bruni, Wear 261 (2006) 1253-1264. The numbers 5.3, 10.4, 55.12, 77.2 and
+  61.9 are recalled and agree with a public code. The third branch is joined to the second without a jump (as printed it
+  begins at zero).
+* ``energy``: only the first branch, loss proportional to frictional work.
 * ``archard``: depth k p s/H, with the wear coefficient k from a map over p and the sliding speed V s, hardness H
   (Archard, J. Appl. Phys. 24 (1953) 981-988; as a map for wheels: Jendel, Wear 253 (2002) 89-99; with the user's bounds
-  and coefficients: GENSYS manual, ``wr_coupl_pra1``, read). Where FASTSIM slides, the traction is mu p: p s = q/mu.
-  The map looks at Hertz's pressure, and at the slip under FASTSIM's parabolic one.
-* ``t_gamma``: volume of a patch per metre rolled over its T gamma, linear between given points, spread as q is: the
-  form of Pearce and Sherratt, Wear 144 (1991) 343-351, whose area per distance times the wheel's diameter is a function
-  of T gamma (times pi: the volume).
+  and coefficients: GENSYS manual, ``wr_coupl_pra1``, read). In FASTSIM's slip zone the traction is mu p: p s = q/mu.
+  The map uses Hertz's pressure, and the slip under FASTSIM's parabolic pressure.
+* ``t_gamma``: volume of a patch per metre rolled over its T gamma, linear between given points and distributed like q.
+  This is the form of Pearce and Sherratt, Wear 144 (1991) 343-351, whose area per distance times the wheel's diameter
+  is a function of T gamma (times pi: the volume).
 
-The coefficients of ``archard`` and ``t_gamma`` are the user's: those of the papers were neither read nor found anew.
+The user gives the coefficients of ``archard`` and ``t_gamma``: those of the papers were neither read nor determined.
 """
 
 from __future__ import annotations
@@ -32,13 +32,16 @@ from wrcore.errors.checked_yaml import validate
 DENSITY = 7850.0  # of steel, kg/m^3
 
 _MILD, _FLAT, _SEVERE = 5.3e-9, 10.4e6, 77.2e6
-"""kg/m/m^2 per N/m^2, and the two bounds in N/m^2: 1 ug/m/mm^2 is 1e-3 kg/m/m^2."""
+"""Wear coefficient of the mild branch, kg/m/m^2 per N/m^2, and bounds of the flat branch, N/m^2: 1 ug/m/mm^2 is 1e-3
+kg/m/m^2."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Friction's work over m patches: ``rows`` channels (m,) of contacts, ``y``, ``dy``, ``dx``, ``work`` of
-    :func:`wrcore.analysis.wear.local_wear.friction_work`, friction coefficient, and rolling ``speed`` (m,), m/s.
+    """Frictional work over m patches, the argument of wear laws.
+
+    ``rows`` are channels (m,) of contacts, ``friction`` is the friction coefficient and ``speed`` (m,) the rolling
+    speed, m/s. The other fields are results of :func:`wrcore.analysis.wear.local_wear.friction_work`.
     """
 
     rows: Mapping[str, np.ndarray]
@@ -54,22 +57,24 @@ Law = Callable[[Sliding], np.ndarray]
 
 
 def sheffield(work):
-    """Loss (kg per metre rolled and m^2) over friction's work per area (N/m^2): mild, flat, then rising steeply."""
+    """Return the loss (kg per metre rolled and m^2) for frictional work per area (N/m^2): mild, flat, then steep."""
     flat = _MILD * _FLAT
     return np.where(work < _FLAT, _MILD * work, flat + 61.9e-9 * np.maximum(work - _SEVERE, 0.0))
 
 
 def energy(work):
-    """Loss (kg per metre rolled and m^2) in proportion to friction's work per area (N/m^2)."""
+    """Return the loss (kg per metre rolled and m^2), proportional to frictional work per area (N/m^2)."""
     return _MILD * np.asarray(work)
 
 
-LAWS = {"sheffield": sheffield, "energy": energy}  # those that need nothing but the work
+LAWS = {"sheffield": sheffield, "energy": energy}  # laws that depend only on work
 
 
 def archard(sliding, hardness, coefficients, speeds, pressures):
-    """Loss (m^3 per metre rolled and m^2, shape of the work) by Archard at a hardness (Pa) with a map: ``coefficients``
-    (pressures + 1, speeds + 1) between the rising bounds of speed (m/s) and pressure (Pa).
+    """Return the loss (m^3 per metre rolled and m^2, shape of the work) by Archard's law at a hardness (Pa).
+
+    The map ``coefficients`` (pressures + 1, speeds + 1) applies between the increasing bounds of speed (m/s) and
+    pressure (Pa).
     """
     pressed = sliding.work / sliding.friction  # p s
     rows, steps = sliding.rows, sliding.work.shape[-1]
@@ -83,8 +88,10 @@ def archard(sliding, hardness, coefficients, speeds, pressures):
 
 
 def over_t_gamma(sliding, points):
-    """Loss (m^3 per metre rolled and m^2, shape of the work) of whole patches, spread as friction's work is; points
-    (k, 2) are T gamma (N, rising) and volume per metre rolled (m^3/m), constant beyond the ends.
+    """Return the loss (m^3 per metre rolled and m^2, shape of the work) from T gamma of whole patches, distributed like
+    frictional work.
+
+    ``points`` (k, 2) are T gamma (N, increasing) and volume per metre rolled (m^3/m), constant beyond the ends.
     """
     rows = sliding.rows
     number = np.abs(rows["Fx_N"] * rows["xi"] + rows["Fy_N"] * rows["eta"])
@@ -95,8 +102,10 @@ def over_t_gamma(sliding, points):
 
 
 def wear_law(law: str | Mapping[str, object], source: str = "local_wear") -> Law:
-    """The law of ``"sheffield"``, ``"energy"``, ``{"archard": {...}}`` or ``{"t_gamma": [...]}`` (schema
-    ``wear_law.yaml``), from :class:`Sliding` to m^3 per metre rolled and m^2; ``source`` is named in errors.
+    """Return the function of a wear law, from :class:`Sliding` to m^3 per metre rolled and m^2.
+
+    ``law`` is ``"sheffield"``, ``"energy"``, ``{"archard": {...}}`` or ``{"t_gamma": [...]}`` (schema
+    ``wear_law.yaml``). Errors name ``source``.
     """
     if isinstance(law, str) and law in LAWS:
         return partial(_by_mass, LAWS[law])
@@ -121,7 +130,7 @@ def wear_law(law: str | Mapping[str, object], source: str = "local_wear") -> Law
 
 
 def check_friction(law, friction, source, field):
-    """Refuse Archard's law where friction is not one number: the work alone does not say pressure and slip then."""
+    """Refuse Archard's law if friction is not one number: then work does not determine pressure times slip."""
     if isinstance(law, Mapping) and "archard" in law and isinstance(friction, Mapping):
         raise InputError(source, field, "expected contact.friction to be one number with the law archard")
 

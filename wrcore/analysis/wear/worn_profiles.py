@@ -1,4 +1,4 @@
-"""Worn profiles as points and files: their points, what is smoothed, and the numbers by which a wheel is judged."""
+"""Worn profiles as points and files: stored points, smoothing, flange dimensions and limits of a wheel."""
 
 import math
 from pathlib import Path
@@ -8,12 +8,12 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing
 
-POINTS = 2.5e-4  # distance of the points of a stored wheel, m
+POINTS = 2.5e-4  # distance between the points of a stored wheel, m
 
 
 def flange(curve):
-    """Sh_m, Sd_m and qR_m of a wheel profile whose inner face is 70 mm from the tape circle (EN 15313, recalled); NaN
-    where it does not reach as far.
+    """Return flange dimensions Sh_m, Sd_m and qR_m of a wheel profile whose inner face is 70 mm from the tape circle
+    (EN 15313, recalled); NaN if the profile does not contain the points.
 
     Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
     Slope qR: along u from there to where the flange is 2 mm short of its tip.
@@ -31,30 +31,32 @@ def flange(curve):
 
 
 def hollow(f):
-    """Depth of a tread's hollow, m: by how much the wheel's radius grows again towards the field side (false flange);
-    ``f`` are ordinates, field side last.
+    """Return the depth of a tread's hollow, m: the largest increase of the wheel's radius towards the field side (false
+    flange); ``f`` are ordinates, field side last.
     """
     outwards = f[int(np.argmin(f)) :]
     return float(np.max(np.maximum.accumulate(outwards) - outwards))
 
 
 def limits_reached(limits, row):
-    """Names of a wear plan's limits (``Sh``, ``hollow`` at most, ``Sd``, ``qR`` at least, m) that a row has reached."""
+    """Return the names of a wear plan's limits that a row has reached: maxima ``Sh``, ``hollow``, minima ``Sd``,
+    ``qR``, m."""
     signs = {"Sh": 1.0, "hollow": 1.0, "Sd": -1.0, "qR": -1.0}
     return [name for name, limit in limits.items() if signs[name] * (row[f"{name}_m"] - limit) >= 0.0]
 
 
 def smooth(values, width):
-    """Depths smoothed over a width (m): the mean over width/sqrt(2) around each point, twice; the sum is kept.
+    """Smooth depths over a width (m): the mean over width/sqrt(2) around each point, twice; the sum is kept.
 
-    One mean over the whole width is as wide, but turns waves of half to once its length over: what wears on ridges
-    would be taken from the valleys beside them, and ridges 2 mm apart would grow from step to step.
+    A single mean over the whole width inverts waves of half to once its length. Wear on ridges would then be subtracted
+    in the valleys, and ridges 2 mm apart would grow from step to step.
     """
     return _mean(_mean(values, width / math.sqrt(2.0)), width / math.sqrt(2.0))
 
 
 def smooth_along(u, f, values, width):
-    """As `smooth`, over a width along the profile u, f (n,), m: a side face of a rail is many times as deep as wide."""
+    """Smooth depths over a width (m) along the arc length of the profile u, f (n,), m: a gauge face of a rail is much
+    higher than wide."""
     edges = edges_of(u)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(edges), np.diff(np.interp(edges, u, f))))])
     even = np.linspace(0.0, arc[-1], round(arc[-1] / POINTS) + 1)
@@ -64,7 +66,7 @@ def smooth_along(u, f, values, width):
 
 
 def _mean(values, width):
-    """Mean over a width (m) around each point; what would go beyond the ends stays at them."""
+    """Return the mean over a width (m) around each point; amounts beyond the ends are added to the end points."""
     half = int(round(0.5 * width / POINTS))
     if half == 0:
         return values
@@ -76,30 +78,32 @@ def _mean(values, width):
 
 
 def across(u, f, loss):
-    """Largest depth, normal to a profile, of what its ordinate loses."""
+    """Return the largest depth, normal to a profile, of a loss of its ordinate, both in the unit of ``loss``."""
     return float(np.max(loss / np.sqrt(1.0 + np.gradient(f, u) ** 2)))
 
 
 def points_of(curve, spacing=POINTS):
-    """The curve at the points that are stored."""
+    """Return u and f, m, of a curve at the points that are stored."""
     u = spacing * np.arange(np.ceil(curve.u[0] / spacing - 1e-9), np.floor(curve.u[-1] / spacing + 1e-9) + 1)
     return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
 
 
 def spacing_of(u):
-    """Distance of stored points, m."""
+    """Return the distance between stored points, m."""
     return (u[-1] - u[0]) / (len(u) - 1)
 
 
 def edges_of(u):
-    """Edges of the bins around stored points."""
+    """Return the edges of the bins around stored points, m."""
     half = 0.5 * spacing_of(u)
     return np.append(u - half, u[-1] + half)
 
 
 def onto_points(u, edges, depth):
-    """Depths over the bins around stored points u (n,) from ``depth`` (m,) over bins between ``edges`` (m + 1,), all m,
-    with the same sum times width; what is beyond the ends stays at them.
+    """Return depths over the bins around stored points u (n,) from ``depth`` (m,) over bins between ``edges`` (m + 1,),
+    all m.
+
+    The area is kept; the area beyond the ends is added to the end points.
     """
     area = np.concatenate([[0.0], np.cumsum(depth * np.diff(edges))])
     inner = np.interp(edges_of(u)[1:-1], edges, area)
@@ -107,18 +111,18 @@ def onto_points(u, edges, depth):
 
 
 def file_of(folder, kind, step):
-    """Path of a step's file in a folder of `wrcore.analysis.evolve.evolve`."""
+    """Return the path of a step's file in a folder of `wrcore.analysis.wear.evolve.evolve`."""
     return Path(folder) / f"{kind}_{step:03d}.csv"
 
 
 def write_points(path, u, f):
-    """Store a profile."""
+    """Write a profile, u and f in m, as a CSV file."""
     with appearing(path) as file:
         np.savetxt(file, np.column_stack([u, f]), ("%.9f", "%.12f"), ",", header="u_m,f_m", comments="")
 
 
 def read_points(path):
-    """Read a profile that was stored; an `InputError` where it is none."""
+    """Read a stored profile; InputError if the file is not a stored profile."""
     try:
         points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except (OSError, ValueError) as error:

@@ -1,8 +1,8 @@
-"""Rails that wear beside the wheels of a plan: a left and a right one for each scene, where all wheels pass.
+"""Wear of the rails of a wear plan: a left and a right rail for each scene, over which all wheels pass.
 
-A rail is worn by the traffic of its line: while the vehicle of a plan runs one metre, so many kilograms pass on the
-rails of each scene (``rails.tonnage``). All of that is taken for vehicles like this one, with wheels worn like these.
-Rails keep their place and their cant; what the gauge face loses widens the gauge, by the mean of both rails.
+A rail is worn by the traffic of its line. ``rails.tonnage`` is the mass, in kg, that passes over the rails of each
+scene while the vehicle of a plan runs one metre. All traffic is assumed to be vehicles like this one, with equally worn
+wheels. Rails keep their position and their cant. Wear of the gauge faces widens the gauge.
 """
 
 from __future__ import annotations
@@ -20,51 +20,55 @@ from wrcore.geometry.track import SIDES
 
 
 class RailsOfStep(NamedTuple):
-    """The rails of a scene at a step."""
+    """The rails of a scene at the start of a step."""
 
     changes: dict
-    """Of the scene's keys."""
+    """Changes of the scene's keys, by key."""
     points: dict
-    """u and f of the points of each side that wheels run on, m; stored ones have the same u."""
+    """Points u and f of the rail of each side on which wheels run, m; stored rails have the same u."""
     shifts: dict
-    """What brings u of a run to that of the points, m: a run counts from the rail's highest point."""
+    """Difference of u of the points and u of a run, m, by side: the origin of a run is the rail's highest point."""
 
 
 DEPTH = 0.010
-"""Below its top, m, where a worn rail's place is held: a new rail's curve ends above the depth of the gauge."""
+"""Depth below its top at which a worn rail's gauge is measured, m: a new rail's curve ends above the depth of the
+gauge."""
 
 POINTS = 1e-4
-"""Distance of the points of a stored rail, m: its gauge face is steep."""
+"""Distance between the points of a stored rail, m: its gauge face is steep."""
 
 FACE, FACE_SLOPE = 3e-4, 7.0
-"""Width (m) and slope of the gauge face of a stored rail below its curve. That of 60E1 stands at 87 to 89 degrees and
-takes up so much from 14 to 22 mm below the top, which no curve f(u) follows (`ProfileCurve`); this one stands at 82."""
+"""Width (m) and slope of the gauge face of a stored rail below its curve. The face of 60E1 has 87 to 89 degrees and
+this width from 14 to 22 mm below the top, which a curve f(u) cannot follow (`ProfileCurve`); this slope is 82 degrees.
+"""
 
 EDGE = 0.1
-"""Turn of a profile at a stored point, rad, from which it is an edge: a gauge corner of 13 mm turns by less. A spline
-turns too far beside one that is steep, and the curve would end there."""
+"""Smallest turn of a profile at a stored point that is an edge, rad: a gauge corner of 13 mm turns by less. Next to a
+steep edge a spline overshoots, and the curve would end there."""
 
 LEFT_OUT = 1e-3
-"""Height of a stored rail's face that a curve may not follow, m."""
+"""Largest height of a stored rail's face that its curve may omit, m."""
 
 PASSES = 4
-"""Of the means that soften an edge, over a point and its neighbours."""
+"""Number of passes of the mean, over a point and its neighbours, that smooths an edge."""
 
 
 def with_gauge_face(u, f):
-    """Points of a new rail (n,), m, with those of its gauge face: where a corner is worn to a flank of 70 degrees, each
-    mm across reaches 3 mm further down, below the end of a new rail's curve."""
+    """Return points of a new rail (n,), m, extended by points of its gauge face.
+
+    If a corner is worn to a flank of 70 degrees, each mm in lateral direction extends it by 3 mm downwards, below the
+    end of a new rail's curve."""
     below = POINTS * np.arange(round(FACE / POINTS), 0, -1)
     return np.append(u[0] - below, u), np.append(f[0] - FACE_SLOPE * below, f)
 
 
 def filled(u, f):
-    """Ordinates (n,), m, of a rail that is nowhere steeper than its face."""
+    """Return ordinates (n,), m, of a rail filled up so that its slope is nowhere above `FACE_SLOPE`."""
     return FACE_SLOPE * u + np.maximum.accumulate((f - FACE_SLOPE * u)[::-1])[::-1]
 
 
 def softened(u, f):
-    """Ordinates (n,), m, of a rail as it is laid: means over some 0.3 mm about its edges."""
+    """Return ordinates (n,), m, of a rail for simulation: smoothed over some 0.3 mm at its edges."""
     turns = np.abs(np.diff(np.arctan(np.diff(f) / np.diff(u))))
     near = maximum_filter1d(np.pad(turns > EDGE, 1), 2 * PASSES + 1)
     soft = f.copy()
@@ -74,11 +78,11 @@ def softened(u, f):
 
 
 def worn_down(u, f, fall):
-    """Points of a rail that has fallen by ``fall`` (n,), m.
+    """Return ordinates (n,), m, of a rail after a decrease by ``fall`` (n,), m.
 
-    None falls further below the lowest around it, within what the deepest place loses, than by its own depth normal to
-    the profile: a face that moves on by several points leaves level ground behind it, no groove, and nothing beyond the
-    ends. Lips go from `DEPTH` below the top on, and what would be steeper than `FACE_SLOPE` is filled up."""
+    A point falls below the lowest neighbour, within the largest wear depth, by at most its own depth normal to the
+    profile. Thus a face that moves by several points leaves a level surface, not a groove. Lips are removed from
+    `DEPTH` below the top on, and slopes above `FACE_SLOPE` are filled up."""
     depth = fall / np.hypot(1.0, np.gradient(f, u))
     around = 2 * math.ceil(depth.max() / spacing_of(u)) + 1
     now = np.maximum(f - fall, minimum_filter1d(f, around, mode="constant", cval=-math.inf) - depth)
@@ -92,25 +96,25 @@ def _new_rails(scene):
 
 
 def lay_rails(folder, scenes):
-    """Store the new rails of all scenes."""
+    """Write the new rails of all scenes to a folder."""
     for place, scene in enumerate(scenes):
         for side, rail in _new_rails(scene).items():
             _store(folder, 0, place, side, *with_gauge_face(*points_of(rail, POINTS)))
 
 
 def _store(folder, step, place, side, u, f):
-    """Store a rail: what is left of it, and what wheels run on."""
+    """Write a rail at the start of a step: the worn profile, and its smoothed form on which wheels run."""
     write_points(rail_file(folder, step, place, side), u, f)
     write_points(rail_file(folder, step, place, side, "laid"), u, softened(u, f))
 
 
 def rail_file(folder, step, place, side, kind="rail"):
-    """Path of a scene's rail at the start of a step, the "rail" of which wear takes or the one that is "laid"."""
+    """Return the path of a scene's rail at the start of a step: the worn "rail", or its smoothed form "laid"."""
     return file_of(folder, f"{kind}_{place}_{side}", step)
 
 
 def rails_of_step(folder, step, place, scene):
-    """`RailsOfStep` of a scene as they lie at the start of a step; ``place`` is the scene's in the plan."""
+    """Return the `RailsOfStep` of a scene at the start of a step; ``place`` is the index of the scene in the plan."""
     changes, points, shifts, gauge = {}, {}, {}, 0.0
     for side, new in _new_rails(scene).items():
         path = rail_file(folder, step, place, side, "laid")
@@ -128,8 +132,10 @@ def rails_of_step(folder, step, place, scene):
 
 
 def falls_of(laid, wheels, passages):
-    """By what the rails' ordinates fall at the stored points, m per metre that the vehicle runs, by side, from the
-    `WheelWear` of all wheels and the passages per metre that one vehicle runs (1/m).
+    """Return the decrease of the rails' ordinates at the stored points, m per metre that the vehicle runs, by side.
+
+    ``wheels`` are the `WheelWear` of all wheels, ``passages`` the passages of vehicles per metre that one vehicle runs,
+    1/m.
     """
     falls = dict.fromkeys(SIDES, 0.0)
     for (_, side), wear in wheels.items():
@@ -139,8 +145,9 @@ def falls_of(laid, wheels, passages):
 
 
 def next_rails(folder, step, falls, length, renewed):
-    """Store the rails of all scenes for the next step: new ones, or those of this one, which over its length (m) have
-    fallen by ``falls`` (scene by scene and by side, m per m).
+    """Write the rails of all scenes for the next step: new rails if ``renewed``, else worn ones.
+
+    Their ordinates decrease by ``falls`` (by scene and side, m per m) times the length of the step (m).
     """
     for place, fall in enumerate(falls):
         for side in SIDES:
@@ -150,7 +157,7 @@ def next_rails(folder, step, falls, length, renewed):
 
 
 def to_renewal(gone, renewal):
-    """Way (m) from a distance to the next renewal of the rails, the whole interval at one."""
+    """Return the distance (m) to the next renewal of the rails; directly after a renewal it is the whole interval."""
     if not renewal:
         return math.inf
     return renewal * (math.floor(gone / renewal + 1e-9) + 1.0) - gone
