@@ -1,7 +1,7 @@
-"""The command ``wrcore``, which ``python -m wrcore`` is, too: one module per command.
+"""Command line ``wrcore``, also ``python -m wrcore``, with one module per command.
 
-Exit status 0 only when the result was produced; 2 for bad input, with one line that names the file, the field and
-what was expected.
+The exit status is 0 only if the result was produced. It is 2 for invalid input, with one line that names the file, the
+field and the expected value.
 """
 
 import atexit
@@ -38,12 +38,12 @@ COMMANDS = (
     init, simulate, fmu, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table,
     profiles, keys,
 )  # fmt: skip
-"""Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
-what the options say."""
+"""Modules with one command each, in the order of the help: ``add(commands)`` adds its parser, ``run(options)`` executes
+the command."""
 
 
 def parser():
-    """The parser of the whole command line; ``parser().parse_args(words).run(options)`` does what the words ask for."""
+    """Return the parser of the whole command line; the parsed options have ``run``, which executes the command."""
     whole = Parser(
         prog="wrcore", description="Wheel-rail contact in railway dynamics.",
         epilog="'wrcore COMMAND --help' lists its options with units and defaults, and the columns of its files. "
@@ -58,18 +58,20 @@ def parser():
 
 
 GARBAGE = 100_000
-"""New objects until Python looks for garbage. With its 700 it looks 700 times while a run's modules are imported, a
-tenth of that time."""
+"""Number of new objects between garbage collections. With Python's default of 700, 700 collections take a tenth of the
+time of importing a run's modules."""
 
 
 def main(arguments=None):
-    """Entry point, with the process's arguments by default: exit status 0 done, 2 bad input, 1 a run that stalled or
-    failed, 4 an accuracy not reached or of a derailment, 128 and its number for a signal.
+    """Execute a command line, by default the process's arguments, and return the exit status.
+
+    It is 0 for success, 2 for invalid input, 1 for a run that stalled or failed, 4 for an accuracy that was not reached
+    or is that of a derailment, and 128 plus its number for a signal.
     """
     gc.set_threshold(GARBAGE)
-    atexit.register(gc.freeze)  # else Python looks, as it ends, for garbage in all that it drops, a tenth of a run
+    atexit.register(gc.freeze)  # avoids a garbage collection at exit, which takes a tenth of a run
     whole = parser()
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next: eval "$(register-python-argcomplete wrcore)"
+    if "_ARGCOMPLETE" in os.environ:  # completion in a shell: eval "$(register-python-argcomplete wrcore)"
         with suppress(ImportError):
             import argcomplete
 
@@ -82,10 +84,10 @@ def main(arguments=None):
     except InputError as error:
         print(f"wrcore: {error}", file=sys.stderr)
         return 2
-    except BrokenPipeError:  # who reads has enough, as ``head`` has; nothing more is written when Python ends
+    except BrokenPipeError:  # the reader, such as ``head``, has closed the pipe; avoid writing at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + SIGPIPE
-    except OSError as error:  # a disk that fills up, a file that goes away
+    except OSError as error:  # disk full, or a file was removed
         print(f"wrcore: {InputError(error.filename or '', '', error.strerror or error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

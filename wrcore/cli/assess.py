@@ -1,4 +1,4 @@
-"""``wrcore assess``: a stored run against a standard."""
+"""``wrcore assess``: assess a stored run by a standard."""
 
 from wrcore.cli.common.files import output, write_csv
 from wrcore.cli.common.options import columns

@@ -1,4 +1,4 @@
-"""``wrcore compare``: two stored runs beside each other."""
+"""``wrcore compare``: compare two stored runs."""
 
 from wrcore.cli.common.files import output, write_csv
 from wrcore.cli.common.options import columns

@@ -1,4 +1,4 @@
-"""``wrcore contact``: the patches of a wheelset in given poses."""
+"""``wrcore contact``: contact patches of a wheelset at given positions and attitudes."""
 
 import json
 import math
@@ -98,7 +98,7 @@ def add(commands):
 
 
 def _pair(options, poses):
-    """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail or the wheel is one of slices."""
+    """Return the `ContactGeometry` of wheel and rail, or a `WheelOnSlices` if one of them has slices."""
     from wrcore.cli.common.options import profile_of, slices_of
     from wrcore.contact.changing_rails.sections import WheelOnSlices
     from wrcore.geometry.changing_rails.slices import RailSlices

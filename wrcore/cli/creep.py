@@ -27,7 +27,7 @@ FILES = columns("OUT.csv, a row per case", case_id="of its case", **as_runs("Fx_
 
 
 def _law(name):
-    """A creep law's name, or Python's word for a wrong one."""
+    """Return the name of a creep law; an unknown name is an error of the parser."""
     from wrcore.creep.cases import MODELS
 
     if name not in MODELS:

@@ -1,4 +1,4 @@
-"""``wrcore curving``: a scene's vehicle in the balance of constant curves."""
+"""``wrcore curving``: equilibrium of a scene's vehicle in constant curves."""
 
 from wrcore.cli.common.files import output, write_csv
 from wrcore.cli.common.options import as_runs, columns

@@ -1,4 +1,4 @@
-"""``wrcore init``: files to start from."""
+"""``wrcore init``: write example files as a starting point."""
 
 ABOUT = """
 Copy the example scenes, their vehicles, sweeps and wear plans into FOLDER, to be run and changed. Nothing that is there

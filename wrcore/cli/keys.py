@@ -1,4 +1,4 @@
-"""``wrcore keys``: what may stand in the files that a person writes."""
+"""``wrcore keys``: list the keys of input files."""
 
 import textwrap
 
@@ -43,5 +43,5 @@ def _is_below(path, key):
 
 
 def _yaml(value):
-    """A default as it would be written."""
+    """Return a default value in the form of YAML."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value

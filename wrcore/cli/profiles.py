@@ -1,4 +1,4 @@
-"""``wrcore profiles``: what can be named, and what a file of points holds."""
+"""``wrcore profiles``: list named profiles, or describe a file of points."""
 
 from wrcore.cli.common.files import output
 from wrcore.cli.common.options import profile_of, profile_spec

@@ -1,4 +1,4 @@
-"""``wrcore simulate``: one run."""
+"""``wrcore simulate``: simulate a scene and write its run."""
 
 import argparse
 import json
@@ -7,7 +7,7 @@ from functools import partial
 from wrcore.cli.common.files import HDF5, output, refuse_others
 
 NOT_REACHED = 4
-"""Exit status of a run that is not as accurate as asked for, or that left the rails: what came after is unknown."""
+"""Exit status of a run that did not reach the required accuracy, or that derailed: its later motion is unknown."""
 
 ABOUT = """
 Run a scene: a file that names vehicle, profiles, track, speed and integration. 'wrcore keys scene'
@@ -83,7 +83,7 @@ def _to_accuracy(options, scene, out):
 
 
 def _print_run(done, as_json):
-    """How a run ended, what it cost, and which limits of validity it exceeded."""
+    """Print how a run ended, its computing time, and the limits of validity that it exceeded."""
     from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS
 
     counters = done.counters
@@ -108,7 +108,7 @@ def _print_run(done, as_json):
         print(f"beyond the models' limits: {', '.join(exceeded)} (of {counters['patches']} patches at output times)")
     if solved := counters.get("patches_not_tabulated", 0):
         print(f"exact contact was solved {solved} times where its table has no answer")
-    if any(errors.values()):  # some was looked up
+    if any(errors.values()):  # a lookup table was used
         normal, force, pressure = (f"{100.0 * error:.2g} %" for error in errors.values())
         print(
             f"looked-up contact, in the middle of cells beside the exact solver: N within {normal}, creep force within "

@@ -58,7 +58,7 @@ def run(options):
 
 
 def _batch(text, runs):
-    """Number (from 0) and count of a batch such as 1/4."""
+    """Parse a batch such as 1/4: return its number (from 0) and the number of batches."""
     number, _, count = text.partition("/")
     if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count) <= runs):
         raise InputError("wrcore sweep", "--batch", f"expected i/n with 1 <= i <= n <= {runs} runs, got {text!r}")

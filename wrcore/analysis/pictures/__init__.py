@@ -1,1 +1,1 @@
-"""Figures and pages."""
+"""Figures and animations of runs, scenes and results."""

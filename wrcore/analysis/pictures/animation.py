@@ -1,4 +1,4 @@
-"""Animation of a run as one page that any browser opens without a network: the data and the program are inside.
+"""Animation of a run as one HTML page with data and program, which any browser shows without a network.
 
 Above, the vehicle from above in the axes of the track, displacements larger than they are by a stated factor. Below,
 one wheelset from behind, true to scale: profiles of wheel and rail where they are, patches, and forces on the wheel.
@@ -24,7 +24,7 @@ from wrcore.run.motion import path_of
 MOST_FRAMES = 600
 FRAME_RATE = 50.0  # frames per second of simulated time, as near as the run's output times allow
 SHOWN = 0.5  # largest displacement from above, as the factor is chosen, m
-POINTS = 160  # of a profile
+POINTS = 160  # number of points of a profile
 OVERHANG = (
     0.5  # a wheelset so far beyond the end of a body's box, m, still is below it: boxes are only as long as inertia
 )
@@ -43,7 +43,7 @@ class Animation:
     data: dict = field(repr=False)
 
     def write(self, path):
-        """Write the page; it appears under its name when it is complete."""
+        """Write the page to a file, which appears under its name only when it is complete."""
         with appearing(path) as file:
             file.write(self.html.encode())
 
@@ -82,7 +82,7 @@ def animate(run, scene, factor=None, begin=0.0, end=math.inf):
 
 
 def _frames(run, begin, end):
-    """Numbers of the output times that are shown."""
+    """Return the indices of the output times that are shown."""
     if not len(run.t) or not 0.0 <= begin < min(end, run.t[-1]):
         last = run.t[-1] if len(run.t) else 0.0
         raise InputError("draw", "begin", f"expected 0 <= begin < end, before the run's end at {last:g} s")
@@ -92,20 +92,22 @@ def _frames(run, begin, end):
 
 
 def _round(value):
-    """The largest of 1, 2, 5, 10, 20 and so on that is not above a value, at least 1."""
+    """Return the largest of 1, 2, 5, 10, 20 and so on that is not above a value, at least 1."""
     power = 10.0 ** math.floor(math.log10(max(value, 1.0)))
     return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= max(value, 1.0))
 
 
 def _numbers(values, digits):
-    """A list for JSON, rounded; absent values are null."""
+    """Convert values to a rounded list for JSON; absent values are null."""
     rounded = np.round(np.asarray(values, float), digits)
     return [None if math.isnan(value) else value for value in rounded.tolist()]
 
 
 def _aside(vehicle, path, name, pose, frames):
-    """Lateral displacement of a body over the frames, m, without what a straight body has in a curve: its middle lies
-    inside the arc on which the wheelsets below it stand, by half the curvature times their mean square distance.
+    """Return the lateral displacement of a body over the frames, m, without the geometric offset in a curve.
+
+    The middle of a straight body lies inside the arc of its wheelsets, by half the curvature times their mean square
+    distance.
     """
     at = vehicle.body_names.index(name)
     shifts = pose["y_m"][frames] - vehicle.positions[at, 1]
@@ -140,7 +142,8 @@ def _wheelset(run, scene, name, frames):
 
 
 def _wheel(contact, side, pair, frames):
-    """Profiles (y, z from axle and track, m), where the rail is (its irregularity), and patches over the frames."""
+    """Return profiles (y, z from axle and track, m), displacements of the rail by irregularity, and patches over the
+    frames."""
     sign, distance = SIDES[side], pair.rail_distance
     u_wheel, u_rail = (np.linspace(curve.u[0], curve.u[-1], POINTS) for curve in (pair.wheel, pair.rail))
     rows = np.stack([contact[name][frames] for name in PATCH], axis=-1)  # (frames, patches, columns)
@@ -158,7 +161,7 @@ def _wheel(contact, side, pair, frames):
 
 
 def _held(values):
-    """The first patch's value in each frame; where there is none that of the frame before, or 0."""
+    """Return the first patch's value in each frame; without a patch that of the previous frame, or 0."""
     first = values[:, 0]
     known = np.maximum.accumulate(np.where(np.isnan(first), -1, np.arange(len(first))))
     return np.where(known < 0, 0.0, first[known])

@@ -1,4 +1,4 @@
-"""Pictures of what a person has at hand: ``wr.draw``."""
+"""Draw scenes, runs, profiles and folders of worn profiles: ``wr.draw``."""
 
 from __future__ import annotations
 
@@ -34,33 +34,34 @@ def draw(
     end: Annotated[float, Within(high=math.inf)] = math.inf,
     trust: bool = False,
 ) -> Figure | Animation:
-    """Draw a scene's vehicle, a profile, put a run in motion, or show how a profile wears.
+    """Draw a scene's vehicle, a profile or the wear of a profile, or animate a run.
 
     Parameters
     ----------
     source : Scene, Run, ProfileCurve, str, Path or dict
         A scene (or its file, or content): side and plan view of its vehicle with all bodies, force elements and joints.
         A run (or its HDF5 file): an animation. A folder of :func:`wrcore.evolve`: the profile over the distance.
-        A profile (:func:`wrcore.named_profile`): its curve and, of a file, the points it follows and those left out.
+        A profile (:func:`wrcore.named_profile`): its curve and, if from a file, the points it follows and those
+        omitted.
     scene : Scene, str, Path or dict, optional
-        That of a run; left out: the one that the run names, with its files looked for from the working directory.
+        Scene of a run; default: the scene that the run names, with files relative to the working directory.
     factor : float, optional
-        By which displacements are drawn larger in an animation from above; left out: a round one that shows them.
+        Magnification of displacements in the animation's plan view; default: a round number that makes them visible.
     begin, end : float
         Part of the run that is shown, s.
     trust : bool
         Whether installed packages that a run file names for its kinds of elements may be imported. Laws of the user in
-        a scene or a run file are never run for a picture.
+        a scene or a run file are never executed for a picture.
 
     Returns
     -------
     matplotlib.figure.Figure or Animation
-        An animation is a page: ``.write("run.html")`` stores it, a notebook shows it.
+        An animation is a page: ``.write("run.html")`` writes it, a notebook shows it.
 
     Raises
     ------
     InputError
-        For what is none of these, and options that do not belong to it.
+        If the source is none of these, or an option does not apply to it.
 
     Examples
     --------

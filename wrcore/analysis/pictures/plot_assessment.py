@@ -1,4 +1,4 @@
-"""What EN 14363 looks at: filtered forces of wheels over time, and their limits."""
+"""Plot of an assessment by EN 14363: filtered forces of wheels over time, and their limits."""
 
 import math
 
@@ -9,13 +9,14 @@ from wrcore.analysis.pictures.style import ACCENT, styled
 from wrcore.errors import InputError
 
 CHANNELS = {"sum_Y": "sum_Y_N", "Q": "Q_N", "Q_qst": "Q_qst_N", "Y_qst": "Y_qst_N"}
-"""Channels that are named as the quantities, where these say no unit."""
+"""Channel names with the unit of quantities whose names do not state it."""
 
 
 @styled
 def plot_assessment(assessment):
-    """Figure of an Assessment by EN 14363: a panel per quantity of its summary; limits of wheelsets that differ by less
-    than a line's width are one."""
+    """Draw an Assessment by EN 14363 with a panel per quantity of its summary.
+
+    Limits of wheelsets that differ by less than a line's width are drawn as one line."""
     quantities = [name for name in assessment.summary.get("quantity", ()) if name in assessment.series]
     if not quantities:
         raise InputError("plot", "standard", f"expected an assessment by EN 14363, got {assessment.standard}")

@@ -1,4 +1,4 @@
-"""Picture of a pair of profiles: where wheel and rail touch as the wheelset moves sideways."""
+"""Plot of the contact points of a wheel profile and a rail profile over the lateral position of the wheelset."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,9 +16,10 @@ _LABEL_WIDTH = 3.5  # mm
 
 @styled
 def fig_contact_location(pair, table):
-    """Contact points of `first_touch` (``table``) on wheel and rail, joined by a line for each lateral shift; whole
-    millimetres are labelled where there is room. Seen from behind: the left side stands on the left. The wheels are
-    drawn at y = 0, lifted by `LIFT`.
+    """Draw contact points of `first_touch` (``table``) on wheel and rail, joined by a line for each lateral shift.
+
+    Integer millimetres are labelled if there is space. The view is from behind, with the left side on the left. The
+    wheels are drawn at y = 0, lifted by `LIFT`.
     """
     figure = Figure(figsize=(7.2, 3.2), layout="constrained")
     for axes, side in zip(figure.subplots(1, 2), SIDES, strict=True):
@@ -50,7 +51,7 @@ def _location(axes, pair, table, side):
 
 
 def _label_shifts(axes, shifts, across, height):
-    """Write whole millimetres of shift above the wheel, small shifts first; leave out what would overlap."""
+    """Write integer millimetres of shift above the wheel, small shifts first; omit labels that would overlap."""
     written: list[float] = []
     for k in np.argsort(np.abs(shifts)):
         whole = abs(shifts[k] - round(shifts[k])) < 1e-6 and np.isfinite(across[k])
@@ -63,13 +64,13 @@ def _label_shifts(axes, shifts, across, height):
 
 @checked
 def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
-    """Draw a pair of profiles with its contact points as the wheelset moves sideways.
+    """Draw a pair of profiles with its contact points for several lateral positions of the wheelset.
 
     Parameters
     ----------
     pair : WheelsetOnTrack
     shifts : array_like, shape (n,), optional
-        Lateral positions, m; left out: -6 to 6 mm.
+        Lateral positions, m; default: -6 to 6 mm.
 
     Returns
     -------

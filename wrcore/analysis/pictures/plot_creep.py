@@ -1,4 +1,4 @@
-"""Picture of creep laws: force over creepage."""
+"""Plot of creep laws: force over creepage."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -11,7 +11,7 @@ from wrcore.creep.cases import MODELS, creep_force
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, checked
 
 LOOKS = ("-", (0, (4, 2)), (0, (1, 1)), "-.", (0, (6, 1, 1, 1)), (0, (2, 2)))
-"""One line per law: told apart in grey too."""
+"""Line styles of the laws, which differ in greyscale, too."""
 
 
 @checked
@@ -30,15 +30,15 @@ def plot_creep_force(
     Parameters
     ----------
     models : str or sequence of str
-        As for :func:`wrcore.creep_force`.
+        Creep laws of :func:`wrcore.creep_force`.
     a, b : float
         Semi-axes along and across rolling, m.
     normal_force : float
-        N.
+        Normal force, N.
     mu : float
         Friction coefficient.
     spin : float
-        1/m, in the right panel.
+        Spin creepage in the right panel, 1/m.
     largest : float
         Largest creepage drawn.
 

@@ -1,4 +1,4 @@
-"""What a wheel does on a crossing: its height, where it touches, and how its load goes from one head to the next."""
+"""Plot of the passage of a wheel over a crossing: height, contact points, and load transfer between the heads."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from wrcore.run.output.run import Run
 from wrcore.scene.description import Source, scene_of
 
 LEAST = 1.0
-"""Load of a patch that is drawn, N."""
+"""Smallest load of a patch that is drawn, N."""
 
 COARSE, NODES = 0.01, 8 * SPACING
-"""Distances along and across at which heads are looked at, m."""
+"""Distances along and across the rail at which heads are evaluated, m."""
 
 NOTCH = 5e-4
-"""Depth of a notch that parts heads which lie against each other, m."""
+"""Depth of a notch that separates adjacent heads, m."""
 
 
 @checked
@@ -31,18 +31,18 @@ NOTCH = 5e-4
 def plot_crossing(
     run: Run, wheelset: str | None = None, scene: Source | None = None, stretch: int = 0, trust: bool = False
 ) -> Figure:
-    """Draw the passage of a wheel over rails that change along the track (`track.crossing`).
+    """Draw the passage of a wheel over rails that vary along the track (`track.crossing`).
 
     Parameters
     ----------
     run : Run
-        With the channels pose and contact.
+        Run with the channels pose and contact.
     wheelset : str, optional
-        Its name; left out: the first one.
+        Name of the wheelset; default: the first.
     scene : Scene, str, Path or dict, optional
-        That of the run; left out: the one that the run names, with its files looked for from the working directory.
+        Scene of the run; default: the scene that the run names, with files relative to the working directory.
     stretch : int, optional
-        Which of the stretches where rails change, from 0 along the track.
+        Index of the section of track on which rails vary, from 0 along the track.
     trust : bool
         Whether packages that a run file names may be imported for its kinds of elements.
 
@@ -55,7 +55,7 @@ def plot_crossing(
     Raises
     ------
     InputError
-        For a run without such rails, or without what is drawn.
+        If the run has no such rails, or not the channels that are drawn.
 
     Examples
     --------
@@ -102,7 +102,7 @@ def plot_crossing(
 
 
 class _Passage:
-    """Channels of a wheel between the ends of a crossing, and on which head each patch is, counted from outside."""
+    """Channels of a wheel between the ends of a crossing, and the head of each patch, counted from outside."""
 
     def __init__(self, run, wheelset, side, scene, crossing):
         motion, group = run[wheelset], f"{wheelset}/{side}"
@@ -129,7 +129,7 @@ class _Passage:
         return np.broadcast_to(self.s[:, None], on.shape)[on], values[on]
 
     def _runs(self, s):
-        """Ends (n, 2) of the heads at an arc length of the track, m, from the innermost one."""
+        """Return the ends (n, 2), m, of the heads at an arc length of the track, m, from the innermost head on."""
         low, high = self.slices.lateral
         u = np.arange(low, high, NODES)
         f = self.slices.heights(self._turn * (s - self._at), u)[0, 0]
@@ -138,7 +138,7 @@ class _Passage:
         return u[np.flatnonzero(np.diff(there.astype(int), prepend=0, append=0)).reshape(-1, 2) - [0, 1]]
 
     def _heads(self, u):
-        """Number of the head of each patch, counted from outside; -1: none."""
+        """Return the number of the head of each patch, counted from outside; -1: none."""
         heads = np.full(u.shape, -1)
         for i, k in np.argwhere(self.load > LEAST):
             ends = self._runs(self.where[i, k])
@@ -147,7 +147,7 @@ class _Passage:
         return heads
 
     def plan(self, crossing):
-        """Pieces of the heads seen from above: arc lengths (2,), m, and y of the inner and the outer edge, mm."""
+        """Yield pieces of the heads in plan view: arc lengths (2,), m, and y of the inner and the outer edge, mm."""
         low, high = crossing.ends
         for s in np.arange(low, high, COARSE):
             for ends in self._runs(s):

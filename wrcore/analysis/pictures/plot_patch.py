@@ -1,4 +1,4 @@
-"""Picture of a loaded wheel on its rail: both profiles, the pressure between them, and the patch from above."""
+"""Plot of a loaded wheel on its rail: both profiles, the contact pressure, and the patch in plan view."""
 
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
 from wrcore.scene.description import Source
 
-TALLEST = 12.0  # height that the greatest pressure is drawn with, mm
+TALLEST = 12.0  # height with which the maximum pressure is drawn, mm
 ARROW = 22.0  # length of the arrow of the most loaded patch's force, mm
 SHOWN_HEIGHTS = (-34.0, 30.0)  # heights between which wheel and rail are shown, mm
 
@@ -31,18 +31,18 @@ def plot_wheel_on_rail(
     source : Scene, str, Path, dict or WheelsetOnTrack
     side : {"left", "right"}
     **pose
-        As for :func:`wrcore.patch`: y, yaw, load, speed, omega and so on.
+        Arguments of :func:`wrcore.patch`: y, yaw, load, speed, omega and so on.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Red in the first panel: the greatest pressure over the length of the patch, on the place where it acts. The
-        second panel is ``Patch.plot`` of the most loaded patch.
+        Red in the first panel: the maximum pressure over the length of the patch, at its lateral position. The second
+        panel is ``Patch.plot`` of the most loaded patch.
 
     Raises
     ------
     InputError
-        As :func:`wrcore.patch`, and for a wheel that does not touch.
+        In the cases of :func:`wrcore.patch`, and if the wheel has no contact.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def plot_wheel_on_rail(
 
 
 def _section(axes, pair, side, patches):
-    """Profiles in the cross-section, filled, and the pressure along them."""
+    """Draw filled profiles in the cross-section, and the pressure along them."""
     sign, (y, z, roll, _) = SIDES[side], patches[0].pose
     u = np.linspace(pair.wheel.u[0], pair.wheel.u[-1], 600)
     across, height = sign * (pair.half_distance + u), pair.wheel(u) - pair.rolling_radius
@@ -90,7 +90,7 @@ def _section(axes, pair, side, patches):
 
 
 def _pressure(axes, patches):
-    """A hill on the contact line of each patch, as high as the greatest pressure over its length."""
+    """Draw the maximum pressure over the length of each patch as a filled curve on its contact line."""
     top = max(one.p_max for one in patches)
     for number, one in enumerate(patches):
         strips = np.unique(one.s[one.touching])
@@ -107,7 +107,7 @@ def _pressure(axes, patches):
 
 
 def _forces(axes, patches):
-    """The force on the wheel at each patch, in the cross-section."""
+    """Draw the force on the wheel at each patch, in the cross-section."""
     forces = [one.track_force[1:] for one in patches]
     longest = max(np.hypot(*force) for force in forces)
     for one, force in zip(patches, forces, strict=True):

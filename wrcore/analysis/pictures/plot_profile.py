@@ -1,4 +1,4 @@
-"""Picture of one profile, with the points of its file that it follows and those that were left out."""
+"""Plot of one profile, with the points of its file that it follows and those that were omitted."""
 
 import math
 
@@ -11,7 +11,7 @@ from wrcore.geometry.profiles.profile import GAUGE_DEPTH, STEEPEST
 
 @styled
 def plot_profile(curve):
-    """Figure of a `ProfileCurve` in the package's axes, true to scale."""
+    """Draw a `ProfileCurve` in the package's axes, true to scale."""
     figure = Figure(figsize=(7.2, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.plot(MM * curve.u, MM * curve.f, color=RAIL, linewidth=5.0, label="curve")

@@ -13,12 +13,12 @@ from wrcore.errors.checked_calls import checked
 @checked
 @styled
 def plot_frequency_response(table: pd.DataFrame) -> Figure:
-    """Draw a frequency response: amplitudes over each other, phases below.
+    """Draw a frequency response: amplitudes in one panel, phases in the panel below.
 
     Parameters
     ----------
     table : pandas.DataFrame
-        Of :func:`wrcore.frequency_response`.
+        Result of :func:`wrcore.frequency_response`.
 
     Returns
     -------
@@ -27,7 +27,7 @@ def plot_frequency_response(table: pd.DataFrame) -> Figure:
     Raises
     ------
     InputError
-        For another table.
+        If it is another table.
 
     Examples
     --------

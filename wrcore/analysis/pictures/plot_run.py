@@ -1,4 +1,4 @@
-"""A quick look at one run: any of its channels over time, with units."""
+"""Plot of any channels of one run over time, with units."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PRINTED = {
     "m": (1e3, "mm"), "rad": (1e3, "mrad"), "N": (1e-3, "kN"), "N m": (1.0, "N m"), "J": (1e-3, "kJ"),
     "W": (1e-3, "kW"), "Pa": (1e-6, "MPa"), "1": (1.0, ""),
 }  # fmt: skip
-"""Factor to the printed unit, and that unit; other units are printed as they are."""
+"""Factor to the printed unit, and the printed unit; other units are printed unchanged."""
 
 LARGE = ("x_m", "s_m", "z_m")  # channels in m that are printed in m
 
@@ -45,7 +45,7 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     run : Run
     channels : sequence of str
         ``"<group>.<channel>"``, such as ``"wheelset/left.N_N"``. Empty: lateral position and yaw of all wheelsets, and
-        vertical and lateral force of each wheel where the run has contacts.
+        vertical and lateral force of each wheel if the run has contacts.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     Raises
     ------
     InputError
-        For a channel that the run does not have.
+        If the run does not have a channel.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
 
 
 def values_of(run: Run, channel: str) -> np.ndarray:
-    """Values of a channel such as ``wheelset/left.N_N``; InputError for one that the run has not."""
+    """Return the values of a channel such as ``wheelset/left.N_N``; InputError if the run does not have it."""
     group, _, name = channel.rpartition(".")
     try:
         return run[group][name]
@@ -87,7 +87,7 @@ def values_of(run: Run, channel: str) -> np.ndarray:
 
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Panels (quantity, lines by label) that say most about a run with the channels that it has."""
+    """Return the default panels (quantity, lines by label) of a run with the channels that it has."""
     names = wheelsets_of(run) or [name for name, group in run.groups.items() if "y_m" in group]
     motion = {q: {name: run.groups[name][q] for name in names if q in run.groups[name]} for q in ("y_m", "yaw_rad")}
     wheels = {f"{name} {side}": wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
@@ -102,7 +102,7 @@ def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
 
 
 def printed(quantity: str) -> tuple[float, str]:
-    """Factor from a channel's values to those that figures print, and the label of an axis with their unit."""
+    """Return the factor from a channel's unit to the printed unit, and the label of an axis with the printed unit."""
     unit, symbol = unit_of(quantity), quantity
     factor, name = (1.0, "m") if quantity in LARGE else PRINTED.get(unit, (1.0, unit))
     if unit != "1":
@@ -128,7 +128,8 @@ def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> 
 
 
 def looks(labels: Sequence[str]) -> list[dict[str, Any]]:
-    """A look of its own for each line: colours by wheelset, dashes by side; told apart in grey too."""
+    """Return a line style for each label: colours by wheelset, dashes by side, so that lines differ in greyscale,
+    too."""
     stems = [label.removesuffix(" left").removesuffix(" right") for label in labels]
     firsts = list(dict.fromkeys(stems))
     styles = []

@@ -1,4 +1,4 @@
-"""Picture of a vehicle as its file describes it: side and plan view with all bodies, force elements and joints.
+"""Plot of a vehicle from its file: side and plan view with all bodies, force elements and joints.
 
 A body is drawn as the homogeneous box of its mass and moments of inertia; a file says no more about its shape. In an
 SVG every part is a group named ``body:NAME``, ``element:NAME`` or ``joint:NAME`` with ``:side`` or ``:plan`` behind.
@@ -36,21 +36,21 @@ MARK = 4.0  # size of a mark, points; of several at one place those below are la
 
 
 class Part(NamedTuple):
-    """A force element or joint as it is drawn."""
+    """A force element or joint in a drawing."""
 
     number: int
     name: str
     kind: str
     bodies: list
     ends: np.ndarray
-    """(2, 3): m."""
+    """Positions of both ends, shape (2, 3), m."""
     along: np.ndarray = np.zeros(3)
     """Direction in which it acts, if not along its line."""
 
 
 def box_of(body):
-    """Length, width and height (m) of the homogeneous box of a body's mass and moments of inertia (dict of a vehicle
-    file); 0 in directions in which no box has such moments.
+    """Return length, width and height (m) of the homogeneous box with a body's mass and moments of inertia (dict of a
+    vehicle file); 0 in directions in which no box has such moments.
     """
     roll, pitch, yaw = (body["inertia"][name] for name in ("roll", "pitch", "yaw"))
     squares = np.array([pitch + yaw - roll, roll + yaw - pitch, roll + pitch - yaw])
@@ -60,8 +60,9 @@ def box_of(body):
 @styled
 @rc_context({"text.parse_math": False})  # names are the user's
 def plot_vehicle(scene):
-    """Side view and plan view (m) of a scene's (first) vehicle in its nominal position; numbers in the plan view name
-    the force elements and joints in the list below.
+    """Draw side view and plan view (m) of a scene's (first) vehicle in its nominal position.
+
+    Numbers in the plan view refer to the force elements and joints in the list below.
     """
     vehicle = scene.vehicle.unit or scene.vehicle
     bodies = vehicle.data["bodies"]
@@ -90,7 +91,7 @@ def plot_vehicle(scene):
 
 
 def _elements(vehicle):
-    """Force elements as `Part`."""
+    """Return the force elements of a vehicle as `Part`."""
     bodies = vehicle.data["bodies"]
     parts = []
     for item in vehicle.data["elements"]:
@@ -123,7 +124,7 @@ def _joints(vehicle):
 
 
 def _limits(bodies, parts):
-    """Smallest and largest x, y, z of what is drawn, m."""
+    """Return the smallest and largest x, y, z of all bodies and parts, m."""
     corners = [part.ends for part in parts]
     for body in bodies.values():
         half = _half(body)
@@ -133,7 +134,7 @@ def _limits(bodies, parts):
 
 
 def _half(body):
-    """Half of what a body takes up along x, y and z, m."""
+    """Return half of the dimensions of a body along x, y and z, m."""
     if body["kind"] == "wheelset":
         radius = body["rolling_radius"]
         return np.array([radius, body["tape_circle_half_distance"] + 0.5 * WHEEL_WIDTH, radius])
@@ -161,8 +162,9 @@ def _draw_body(axes, name, body, view, upright):
 
 
 def _draw_parts(axes, parts, view, upright):
-    """A mark for each part, the line between its ends, and a stroke along the direction in which it acts; the marks'
-    places (m) with the size of the largest one (points).
+    """Draw a mark for each part, the line between its ends, and a stroke along the direction in which it acts.
+
+    Return the marks' positions (m) with the size of the largest mark (points).
     """
     places = _by_position(parts, upright)
     for (x, across), here in places.items():
@@ -180,7 +182,7 @@ def _draw_parts(axes, parts, view, upright):
 
 
 def _by_position(parts, upright):
-    """Parts by the place (m) of their middle in a view."""
+    """Return the parts by the position (m) of their middle in a view."""
     places = {}
     for part in parts:
         middle = part.ends.mean(axis=0)
@@ -189,7 +191,7 @@ def _by_position(parts, upright):
 
 
 def _size(below):
-    """Of a mark with others of the same place on top of it, points."""
+    """Return the size of a mark, points, below which other marks are drawn at the same position."""
     return MARK + min(1.8 * below, 8.0)
 
 
@@ -209,7 +211,7 @@ def _numbers(parts):
 
 
 def _label(axes, texts, spots, scale):
-    """Write each text near its place (m), where it covers no mark (m) and no other text if there is such a place."""
+    """Write each text near its position (m), if possible without covering marks (m) or other texts."""
     points = 72.0 * scale
     taken = [(points * x, points * y, size, size) for (x, y), size in spots.items()]
     for text, place in texts:
@@ -233,7 +235,7 @@ def _meet(one, other):
 
 
 def _rails(side, plan, bodies, low, high):
-    """The rails' highest points, where a vehicle has wheelsets."""
+    """Draw the rails at the height of their highest points, if a vehicle has wheelsets."""
     reach = {b["tape_circle_half_distance"] for b in bodies.values() if b["kind"] == "wheelset"}
     ends = [low[0] - 0.5, high[0] + 0.5]
     look = {"color": "0.6", "linewidth": 1.6, "zorder": 0}
@@ -244,7 +246,7 @@ def _rails(side, plan, bodies, low, high):
 
 
 def _list(words, parts):
-    """Names behind the numbers, column by column."""
+    """Write the list of numbers and names of parts, column by column."""
     words.set_axis_off()
     rows = -(-len(parts) // COLUMNS)
     for k, part in enumerate(parts):
@@ -255,7 +257,7 @@ def _list(words, parts):
 
 
 def _legend(figure, parts, bodies):
-    """What the marks stand for, with how many there are; and the boxes."""
+    """Draw the legend of marks, with the number of parts of each kind, and of boxes."""
     kinds = [part.kind for part in parts]
     handles = [
         Line2D([], [], linestyle="", markersize=4.5, label=f"{kind.replace('_', ' ')} ({kinds.count(kind)})", **look)

@@ -1,4 +1,4 @@
-"""Worn profiles over a distance. Units change here: m to mm and km."""
+"""Plot of worn profiles over a distance, in mm and km."""
 
 import matplotlib as mpl
 import numpy as np
@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from wrcore.analysis.pictures.style import MM, styled
 
 KM = 1e-3
-SHOWN = 6  # profiles drawn, evenly over the distance
+SHOWN = 6  # number of profiles drawn, evenly over the distance
 
 FLANGE = (
     ("Sh_m", "k-", "flange height Sh"),
@@ -18,8 +18,10 @@ FLANGE = (
 
 @styled
 def plot_evolution(profiles, table):
-    """Worn ``profiles`` (distance, u and f (m) of each step, of `profiles_over_distance`), and
-    flange, conicity and wear rate of the ``table`` of `evolve` over the distance.
+    """Draw worn profiles, and flange, conicity and wear rate over the distance.
+
+    ``profiles`` are results of `profiles_over_distance` (distance, u and f of each step, m), ``table`` that of
+    `evolve`.
     """
     new = profiles[0][1:]
     figure = Figure(figsize=(7.2, 7.6), layout="constrained")

@@ -1,4 +1,4 @@
-"""One style for all figures; units change in the functions that draw them, and nowhere before."""
+"""Common style of all figures; only functions that draw convert units."""
 
 from functools import wraps
 from pathlib import Path
@@ -26,7 +26,7 @@ WHEEL, RAIL, ACCENT = "0.25", "0.6", "#CC3311"
 
 
 def styled(function):
-    """Draw with the project's style, whatever the caller has set."""
+    """Decorate a function that draws, so that it uses the project's style instead of the caller's."""
 
     @wraps(function)
     def inner(*args, **kwargs):
@@ -37,13 +37,13 @@ def styled(function):
 
 
 def plain(name):
-    """A name that others gave, as figures print it: its dollar signs begin no formula."""
+    """Return a user's name for figures, with escaped dollar signs, which would begin a formula."""
     return str(name).replace("$", r"\$")
 
 
 @styled
 def save_figure(figure, *paths):
-    """Write a figure as ``.png`` and ``.svg`` by the paths' endings, folders created; equal figures give the same."""
+    """Write a figure as ``.png`` or ``.svg`` by the ending of each path; files of equal figures are identical."""
     for path in map(Path, paths):
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)

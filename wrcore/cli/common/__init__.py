@@ -1,1 +1,1 @@
-"""What several commands share: options, files that they write."""
+"""Options and output files that several commands share."""

@@ -1,4 +1,4 @@
-"""Files that commands write: refused before any work starts, and never half a file."""
+"""Output files of commands: paths are checked before the computation, and files are never incomplete."""
 
 import json
 import os
@@ -9,7 +9,7 @@ from wrcore.errors.new_files import HDF5, appearing, named, try_out
 
 
 def output(path, endings=(".csv",), option="--out"):
-    """Refuse an output path that cannot be written, or is of another kind, before any work starts."""
+    """Refuse an output path that cannot be written, or has another ending, before the computation starts."""
     named(path, endings, option)
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or (os.path.exists(path) and not os.path.isfile(path)):
         raise InputError(option, path, "expected a file in an existing folder")
@@ -21,7 +21,7 @@ def output(path, endings=(".csv",), option="--out"):
 
 
 def refuse_others(path, attribute, wanted):
-    """Refuse to write over an HDF5 file whose attribute (of a scene: its name) says that it is something else."""
+    """Refuse to overwrite an HDF5 file whose attribute (for a scene: its name) has another value than ``wanted``."""
     if path.suffix.lower() not in HDF5 or not path.exists():
         return
     from wrcore.errors.checked_hdf5 import checked_hdf5, foreign
@@ -32,13 +32,13 @@ def refuse_others(path, attribute, wanted):
             with checked_hdf5(path, f"one of {wanted!r}") as file:
                 value = str(file.attrs.get(attribute, found))
                 found = json.loads(value)["name"] if attribute == "scene" and value != found else value
-        except InputError:  # damaged, or what no program can read: it may go
+        except InputError:  # damaged or unreadable: it may be overwritten
             return
     if found != wanted:
         raise InputError("--out", path, f"expected no file, or one of {wanted!r}; this one is of {found!r}: remove it")
 
 
 def write_csv(frame, path):
-    """Write a table: never half a file."""
+    """Write a table as CSV; the file appears only when it is complete."""
     with appearing(path) as file:
         frame.to_csv(file, index=False, float_format="%.12g")

@@ -1,4 +1,4 @@
-"""Options that several commands have, and how all of them explain themselves and refuse."""
+"""Options that several commands share, and the help texts and errors of all commands."""
 
 import argparse
 import os
@@ -10,7 +10,7 @@ from wrcore.run.output.channels import DESCRIPTIONS, unit_of
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
-    """Texts as they are written, and each option with its default."""
+    """Formatter of help texts that keeps their line breaks and adds the default of each option."""
 
     def _get_help_string(self, action):
         text = action.help or ""
@@ -22,7 +22,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are ours: one line, with the word that was perhaps meant."""
+    """Parser whose errors are InputError: one line, with a suggestion for a misspelt word."""
 
     def __init__(self, **settings):
         super().__init__(**{"formatter_class": _Help, **settings})
@@ -31,7 +31,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(self.prog, "", message)
 
     def parse_known_args(self, args=None, namespace=None):
-        """As argparse's, but an unknown option ends here, where the known ones are known."""
+        """Parse known arguments; raise an error for an unknown option with a suggestion from the known options."""
         found, left = super().parse_known_args(args, namespace)
         options = [word.partition("=")[0] for word in left if word.startswith("--")]
         if options:
@@ -44,8 +44,10 @@ class Parser(argparse.ArgumentParser):
 
 
 def columns(title, **texts):
-    """What a table holds, as text for a help page: meaning by column; an empty one is that of the run's channel of this
-    name. Units are those that the names state.
+    """Return the description of a table's columns as text for a help page.
+
+    ``texts`` are meanings by column; an empty text is replaced by that of the run's channel with this name. Units are
+    those that the names state.
     """
     lines = [f"{title}:"]
     for name, text in texts.items():
@@ -56,12 +58,12 @@ def columns(title, **texts):
 
 
 def as_runs(*names):
-    """Columns that are a run's channels of these names, for `columns`."""
+    """Return empty texts for `columns` that are described like a run's channels with these names."""
     return dict.fromkeys(names, "")
 
 
 def add_pair(command, slices=""):
-    """Options of a wheel on a rail; ``slices``: what more a rail may be."""
+    """Add the options of a wheel on a rail; ``slices`` is appended to the help of ``--rail``."""
     what = "profile: a name ('wrcore profiles'), a file of points, or '{points: FILE, ...}'"
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help=what)
     command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what + slices)
@@ -78,7 +80,7 @@ def add_pair(command, slices=""):
 
 
 def pair_of(options):
-    """`WheelsetOnTrack` of the options of `add_pair`, and of those of a right wheel that differs."""
+    """Return the `WheelsetOnTrack` of the options of `add_pair`, and of optional ones of a different right wheel."""
     from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 
     given = {"right_wheel": None, "right_rolling_radius": None} | vars(options)
@@ -91,8 +93,9 @@ def pair_of(options):
 
 
 def profile_of(options, spec, kind):
-    """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply. ``--inclination`` is that of
-    the rail in a pair."""
+    """Return a named profile, or a profile from a file, to which ``--unit`` and ``--smoothing`` apply.
+
+    In a pair, ``--inclination`` is that of the rail."""
     from wrcore.geometry.profiles.standards import named_profile
 
     beside_a_rail = kind == "wheel" and hasattr(options, "rail")
@@ -100,7 +103,7 @@ def profile_of(options, spec, kind):
 
 
 def profile_spec(options, spec):
-    """A profile's name, or the mapping of a file and how to read it."""
+    """Return a profile's name, or the mapping of a file with its unit and smoothing."""
     from wrcore.errors.checked_yaml import parse_value
 
     described = parse_value(spec) if spec.lstrip().startswith("{") else {"points": spec}
@@ -114,7 +117,7 @@ def profile_spec(options, spec):
 
 
 def slices_of(options, kind):
-    """`RailSlices` of ``--rail`` or `WheelSlices` of ``--wheel``; None where it is the same everywhere."""
+    """Return `RailSlices` of ``--rail`` or `WheelSlices` of ``--wheel``; None if the profile is constant."""
     from wrcore.errors.checked_yaml import parse_value
     from wrcore.geometry.changing_rails.files import is_slices, read_slices
 
@@ -132,7 +135,7 @@ def slices_of(options, kind):
 
 
 def ratio(text):
-    """A ratio such as 1/40; None where none is given."""
+    """Parse a ratio such as 1/40; return None if none is given."""
     from wrcore.errors.checked_yaml import parse_ratio
 
     if text is None:
