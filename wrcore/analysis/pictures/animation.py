@@ -1,7 +1,7 @@
 """Animation of a run as one HTML page with data and program, which any browser shows without a network.
 
-Above, the vehicle from above in the axes of the track, displacements larger than they are by a stated factor. Below,
-one wheelset from behind, true to scale: profiles of wheel and rail where they are, patches, and forces on the wheel.
+The upper part is a plan view of the vehicle in the axes of the track, with displacements magnified by a stated factor.
+The lower part is one wheelset from behind, true to scale: profiles of wheel and rail, patches, and forces on the wheel.
 """
 
 import json
@@ -34,9 +34,11 @@ PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
 
 @dataclass(frozen=True)
 class Animation:
-    """A page (``html``) with a run in motion; a notebook shows it. ``data`` is what it draws: per body nominal place
-    and size (m), ``y`` (m; without the offset of straight bodies in curves) and ``yaw`` (rad) over the frames, both
-    times ``factor``; per wheelset its pose, true to scale, and per wheel profiles, patches and forces.
+    """A page (``html``) with the animation of a run; a notebook shows it.
+
+    ``data`` are the drawn numbers. Per body: nominal position and size (m), ``y`` (m; without the offset of straight
+    bodies in curves) and ``yaw`` (rad) over the frames, both times ``factor``. Per wheelset: position and attitude,
+    true to scale, and per wheel profiles, patches and forces.
     """
 
     html: str = field(repr=False)
@@ -52,8 +54,9 @@ class Animation:
 
 
 def animate(run, scene, factor=None, begin=0.0, end=math.inf):
-    """Put a run with the channels pose and contact in motion over ``begin``..``end`` (s; the first `MOST_FRAMES`
-    frames), displacements drawn larger by ``factor`` (left out: a round one with which the largest is some `SHOWN` m).
+    """Animate a run with the channels pose and contact over ``begin``..``end`` (s; the first `MOST_FRAMES` frames).
+
+    Displacements are magnified by ``factor``; by default a round number with which the largest is about `SHOWN` m.
     """
     frames = _frames(run, begin, end)
     vehicle = scene.vehicle
