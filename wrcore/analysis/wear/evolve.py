@@ -99,8 +99,8 @@ def load_wear_plan(
 
 
 def _check_sets(stated, data, name):
-    """Raise InputError if the ``set`` in the plan's file and that of a scene have a key in common, or if one of them
-    has a key that the plan sets by another name."""
+    """Raise InputError for a key in both the plan file's ``set`` and a scene's, or for a key that the plan sets
+    itself."""
     fixed = {"output.rate": "the plan's key rate is the output rate of its runs"}
     if data["patches"] == "exact":
         fixed["output.channels"] = "exact patches need channels of their own"
@@ -183,8 +183,8 @@ def evolve(
     pandas.DataFrame
         ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (largest
         depth, normal to the profile, m per m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step),
-        at_limit (number of limits reached: then the row has no step, and the wheel of a next row is turned). The last
-        row has the profile at the end, and no step.
+        at_limit (number of limits reached; then no step follows, and the next wheel is turned). The last row has the
+        profile at the end.
 
     Raises
     ------
@@ -309,8 +309,7 @@ class StepWear(NamedTuple):
     volume: float
     """Volume lost by a wheel, m^3 per m."""
     falls: list[dict[str, np.ndarray]]
-    """Decrease of the ordinates of each scene's rails at their stored points, smoothed, m per m that the vehicle runs;
-    empty unless rails wear."""
+    """Decrease of the ordinates of each scene's rails, smoothed, m per m that the vehicle runs; empty without wear."""
     deepest: float
     """Largest loss normal to the wheel's profile, m per m."""
     fastest: float
@@ -331,8 +330,7 @@ class SceneWear(NamedTuple):
     rails: dict[str, float]
     """Area lost by each rail's section, m^2 per million gross tonnes."""
     falls: dict[str, np.ndarray]
-    """Decrease of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails
-    wear."""
+    """Decrease of the rails' ordinates at their stored points, m per m that the vehicle runs; empty without wear."""
     laid: worn_rails.RailsOfStep | None
     """The rails, if they wear."""
     seconds: tuple[float, float]
