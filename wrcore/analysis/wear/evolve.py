@@ -99,8 +99,7 @@ def load_wear_plan(
 
 
 def _check_sets(stated, data, name):
-    """Raise InputError for a key in both the plan file's ``set`` and a scene's, or for a key that the plan sets
-    itself."""
+    """Raise InputError for a key in both the plan file's ``set`` and a scene's, or a key that the plan sets."""
     fixed = {"output.rate": "the plan's key rate is the output rate of its runs"}
     if data["patches"] == "exact":
         fixed["output.channels"] = "exact patches need channels of their own"
