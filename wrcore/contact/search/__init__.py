@@ -1,1 +1,1 @@
-"""Where wheel and rail overlap, and the overlaps' depth, place and curvature."""
+"""Contact search: overlaps of wheel and rail, and their penetration, position and curvature."""

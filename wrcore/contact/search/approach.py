@@ -1,17 +1,18 @@
-"""How deep the overlaps of a patch are together, along which normal, and how fast they get deeper.
+"""Penetration, normal and approach speed of all overlaps of a contact patch together.
 
-With the vertical gap g of a left wheel's strips, M0 = sum of int g^2 du changes by
+With the vertical gap g of a left wheel's strips, the sum M0 of int g^2 du over the overlaps has the differential
 
     dM0 = 2 sum of int g dg du
 
-where the wheel moves. Lifted along n = -grad M0 / G, with the gradient over y and z and its size G, a single parabola
-would hang free at the height
+for a displacement of the wheel. Let G be the magnitude of the gradient of M0 over y and z. A displacement along
+n = -grad M0 / G by
 
-    depth = 2.5 M0 / G,
+    depth = 2.5 M0 / G
 
-its deepest penetration, and it comes nearer at the speed (dM0/dt) / G. All three are sums over the overlaps: nothing
-steps where two of them merge. They are summed over the wheel profile's own nodes: those of the scan move the
-place of an overlap to and fro, which costs critical speeds of looked-up contact 0.2 m/s.
+would separate a single parabolic overlap. This is its maximum penetration; the approach speed is (dM0/dt) / G. All
+three are sums over the overlaps, so that they are continuous where two overlaps merge. The sums use the nodes of the
+wheel profile. With the scan's nodes the position of an overlap fluctuates, which costs 0.2 m/s of critical speed with
+contact from the lookup table.
 """
 
 import math
@@ -34,13 +35,15 @@ from wrcore.contact.search.strip import (
 from wrcore.kernels.jit import FUSED, jit
 
 LEVEL = 1.0, 0.0
-"""Axes that do not lean, see `wrcore.contact.search.strip.lean_at`."""
+"""Cosine and sine of the angle of axes without inclination, see `wrcore.contact.search.strip.lean_at`."""
 
 
 class Pressed(NamedTuple):
-    """M0 of a patch's overlaps (m^3), their place on the wheel's profile times M0, and what M0 changes by where the
-    wheel's centre moves across and up (m^2) or the wheel turns about x, y and z (m^3); what the second one changes by
-    across and up (m^3)."""
+    """Moments of the overlaps of a patch and their derivatives with respect to the position of the wheel.
+
+    M0 (m^3) and M1, M0 times the mean wheel coordinate of the overlaps (m^4). Derivatives of M0 with respect to lateral
+    and vertical displacement (m^2) and to rotation about x, y and z (m^3). Derivatives of M1 with respect to lateral
+    and vertical displacement (m^3)."""
 
     square: float
     moment: float
@@ -55,7 +58,7 @@ class Pressed(NamedTuple):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_pressed(one, other):
-    """Of both together."""
+    """Sum of the moments of two groups of overlaps, and of their derivatives."""
     return Pressed(
         one.square + other.square, one.moment + other.moment, one.across + other.across, one.up + other.up,
         one.about_x + other.about_x, one.about_y + other.about_y, one.about_z + other.about_z,
@@ -65,7 +68,7 @@ def add_pressed(one, other):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def approach_of(pressed, m):
-    """Depth (m), cosine and sine of the normal, and speed (m/s) at which a motion ``m`` makes the overlaps deeper."""
+    """Return penetration (m), cosine and sine of the normal's angle, and approach speed (m/s) for a motion ``m``."""
     size = math.sqrt(pressed.across * pressed.across + pressed.up * pressed.up)
     rate = pressed.across * m.vy + pressed.up * m.vz + pressed.about_x * m.wx + pressed.about_y * m.wy
     inverse = 1.0 / size
@@ -75,14 +78,16 @@ def approach_of(pressed, m):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _strip_rates(gap, slope, px, py, pz):
-    """Rates of a strip's g^2 over its gap's, see `Pressed`."""
+    """Derivatives of g^2 of one strip with respect to the five motions of the wheel in `Pressed`.
+
+    ``slope`` is the rail's slope; ``px``, ``py``, ``pz`` is the strip's point from the wheelset's centre (m)."""
     g = 2.0 * gap
     return -g * slope, g, g * (py + slope * pz), -g * px, -g * slope * px
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _of_parabola(pose, row):
-    """Of an overlap too narrow for anything else than a parabola, found at this pose."""
+    """`Pressed` of an overlap with few nodes, from the parabola in its ``row``, found at this ``pose``."""
     depth, cosine = row[PENETRATION], row[COSINE]
     square = depth * depth * math.sqrt(depth / row[CURVATURE_Y]) / (0.9375 * cosine)
     gap = -1.25 * square * cosine / depth
@@ -92,7 +97,9 @@ def _of_parabola(pose, row):
 
 @jit(allocates=False, fastmath=FUSED)
 def _strip_by_strip(geometry, pose, lean, nodes):
-    """Of an overlap at its nodes, in axes that ``lean``, and how many there are."""
+    """Return the number of nodes in overlap and the overlap's `Pressed`, summed node by node.
+
+    ``lean`` is the inclination of the axes, see `wrcore.contact.search.strip.lean_at`."""
     square = moment = across = up = about_x = about_y = about_z = moment_across = moment_up = 0.0
     count = 0
     for k in range(nodes.first, nodes.end):
@@ -118,9 +125,10 @@ def _strip_by_strip(geometry, pose, lean, nodes):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def pressed_from(pose, middle, sums):
-    """Of an overlap with these `slopes_of_square`."""
+    """`Pressed` of an overlap from the ``sums`` of `slopes_of_square`, which are relative to the coordinate ``middle``
+    (m)."""
     roll, yaw = sums[0, 1 + ROLL], sums[0, 1 + YAW]
-    turned = -(pose.ex * roll + pose.ez * yaw) / pose.ey  # about its axle a wheel turns without a change
+    turned = -(pose.ex * roll + pose.ez * yaw) / pose.ey  # rotation about the axle does not change M0
     across, up = sums[0, 1 + ACROSS], sums[0, 1 + UP]
     return Pressed(
         sums[0, 0], middle * sums[0, 0] + sums[1, 0], across, up, roll, turned, yaw,
@@ -130,8 +138,9 @@ def pressed_from(pose, middle, sums):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def pressed_by(geometry, pose, spatial, lean, row, sums):
-    """`Pressed` of one overlap of a left wheel, found by moments at this ``pose``. ``sums`` (3, 1 + MOVES) is
-    scratch."""
+    """`Pressed` of one overlap of a left wheel, whose ``row`` was found by moments at this ``pose``.
+
+    ``sums`` (3, 1 + MOVES) is scratch."""
     if spatial and not changes_along(geometry) and not leaves_cells(pose):
         middle = slopes_of_square(geometry, pose, row, sums)
         return _of_parabola(pose, row) if math.isnan(middle) else pressed_from(pose, middle, sums)
@@ -141,7 +150,7 @@ def pressed_by(geometry, pose, spatial, lean, row, sums):
 
 @jit(allocates=False, fastmath=FUSED)
 def pressed_together(geometry, pose, spatial, lean, rows, first, last, sums):
-    """`Pressed` of the overlaps from ``first`` to before ``last``."""
+    """Sum of the `Pressed` of the overlaps in rows ``first`` to ``last`` - 1."""
     total = pressed_by(geometry, pose, spatial, lean, rows[first], sums)
     for k in range(first + 1, last):
         total = add_pressed(total, pressed_by(geometry, pose, spatial, lean, rows[k], sums))

@@ -1,10 +1,12 @@
 """Contact detection on a tangent track: planar and spatial search for the patches between a wheel and its rail.
 
-Wheel and rail become a gap over the wheel's lateral coordinate (:mod:`wrcore.contact.search.strip`); every interval in
-which it is negative is a patch, reduced to a Hertz patch by one of two rules (:mod:`wrcore.contact.search.reduction`).
+:mod:`wrcore.contact.search.strip` computes the gap between wheel and rail over the wheel's lateral coordinate. Every
+interval of negative gap is an overlap. One of two rules reduces it to a Hertz patch
+(:mod:`wrcore.contact.search.reduction`).
 
-The search looks at all strips every time: nothing is tracked, nothing can be lost. Between two nodes of the scan the
-gap can go deeper than at them by no more than a known reserve (M h^2/8), and only where that matters it looks closer.
+Each search evaluates all strips and uses no result of an earlier search, so that it cannot lose a patch. Between two
+nodes of the scan the gap is less than at the nodes by at most a known reserve (M h^2/8). Where the nodes alone cannot
+exclude an overlap, the search evaluates points between them.
 
 References
 ----------
@@ -66,26 +68,29 @@ from wrcore.kernels.jit import jit, rarely_called
 
 DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
 PLANAR, SPATIAL, AUTO = 0, 1, 2
-"""``auto``: planar while the bound of its error stays below a tolerance, spatial else."""
+"""Codes of the detections. ``auto`` is planar while the bound of the planar error is below a tolerance, else
+spatial."""
 
 _PARTS, _EXACT_PARTS = 3, 12
-"""Sub-intervals of a scan step where the search looks closer: of common poses, and of those beyond the rail's cells,
-whose strips on a curved flange lie up to four times as far apart along the rail."""
+"""Sub-intervals of a scan step where the search evaluates points between two nodes: for common positions and attitudes,
+and for those where strips leave their rail cells (`leaves_cells`). In the second case strips on a curved flange have up
+to four times the spacing over the rail."""
 
 _FLANK = 2
-"""Close strips on either side of an overlap that are taken for its own flanks."""
+"""Number of strips with a small gap on either side of an overlap that are attributed to this overlap."""
 
 WIDE = 10
-"""Overlaps of at least this many scan nodes are integrated over them, narrower ones over the profiles' own nodes, and
-those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
+"""Minimum number of nodes for a sum over nodes. Overlaps with fewer scan nodes are integrated over the nodes of the
+profiles. If these are too few as well, Gauss-Legendre quadrature between the edges is used."""
 
 _AS_ONE = 0.5
-"""Overlaps become one row, where rows are short, if the rail turns by less (rad) between them."""
+"""Maximum change of the rail's inclination (rad) between two overlaps that are merged when there are more overlaps than
+rows."""
 
 
 @jit(allocates=False)
 def _take_out(patches, k):
-    """Take the k-th row out of full ones; the others stay in order."""
+    """Remove the k-th row of a full patch array; the order of the other rows does not change."""
     for i in range(k, MAX_PATCHES - 1):
         for column in range(PATCH_COLUMNS):
             patches[i, column] = patches[i + 1, column]
@@ -93,9 +98,11 @@ def _take_out(patches, k):
 
 @jit(allocates=False)
 def _join_shallowest(geometry, pose, outside, beyond, depth, patches):
-    """Make one row of the shallowest overlap and the nearer one of its neighbours, where all rows are taken by moments
-    and another overlap follows from ``outside`` to ``beyond``, of a ``depth``. Returns the row that is free for that
-    one now, MAX_PATCHES where it has become part of the last row, -1 where the rail turns too much between both."""
+    """Merge the shallowest overlap with its nearer neighbour, to make room for one more overlap in a full array.
+
+    The further overlap reaches from ``outside`` to ``beyond`` and has the penetration ``depth`` (m). All rows come from
+    the reduction ``moment``. Returns the row that is free for the further overlap, MAX_PATCHES if it was merged with
+    the last row, or -1 if the rail's inclination differs too much (`_AS_ONE`)."""
     last, shallowest = MAX_PATCHES - 1, MAX_PATCHES
     for k in range(MAX_PATCHES):
         if patches[k, PENETRATION] < depth:
@@ -125,12 +132,12 @@ def _join_shallowest(geometry, pose, outside, beyond, depth, patches):
 @jit(allocates=False)
 def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepest, depth, m0, m1, m2, nodes, patches,
                  count):  # fmt: skip
-    """Reduce one overlap and store its patch; when all rows are taken the shallowest one becomes one with its neighbour
-    (`_join_shallowest`), or gives way to a deeper one.
+    """Reduce one overlap to a patch, store it and return the new number of patches.
 
-    ``outside`` and ``beyond`` are points without overlap next to its ``first`` and ``last`` strip, ``deepest`` and
-    ``depth`` (along the normal) its deepest strip; m0, m1, m2 are sums of g^2 over its ``nodes`` scan nodes, positions
-    counted from ``first``."""
+    If all rows are in use, the shallowest patch is merged with its neighbour (`_join_shallowest`) or replaced by a
+    deeper one. ``outside`` and ``beyond`` are points without overlap next to the overlap's ``first`` and ``last``
+    strip. ``deepest`` is the deepest strip and ``depth`` its penetration along the normal. m0, m1, m2 are sums of g^2,
+    g^2 e and g^2 e^2 over the ``nodes`` scan nodes, with e (m) from ``first``."""
     if count == MAX_PATCHES and reduction == MOMENT and not (leaves_cells(pose) or changes_along(geometry)):
         free = _join_shallowest(geometry, pose, outside, beyond, depth, patches)
         if free == MAX_PATCHES:
@@ -166,11 +173,11 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
 
 @jit(allocates=False)
 def _search(geometry, pose, grid, reduction, first_close, last_close, patches, count):
-    """All overlaps strip by strip, with a closer look wherever the reserve allows one between two nodes without.
+    """Find all overlaps strip by strip, add their patches to the ``count`` present ones and return the new number.
 
-    Only strips from ``first_close`` to ``last_close`` and their neighbours can take part: of those over the rail's
-    cells or, where strips leave these, of the whole wheel. Patches are added to the ``count`` there are; returns their
-    new number."""
+    Where the reserve allows an overlap between two nodes that have none, points between the nodes are evaluated. Only
+    strips from ``first_close`` to ``last_close`` and their neighbours are searched. Strips are numbered over the rail
+    cells; where strips leave their cells, all strips of the wheel are included."""
     rarely_called()
     wheel, rail = geometry.scan_wheel, geometry.scan_rail
     cells = rail.shape[1]
@@ -198,7 +205,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
             coarse = strip_gap(grid, wheel, rail, k)
         cell = rail_cell(geometry, pose, here) if exact else k
         reserve = wheel[WHEEL_RESERVE, grid.node + k] + rail[RAIL_RESERVE, cell]
-        if exact:  # yaw draws strips of a curved flange apart along the rail: the gap bends with the square of that
+        if exact:  # yaw increases the spacing of a curved flange's strips over the rail; curvature grows as its square
             second = SECOND_BOUND * wheel[WHEEL_RESERVE, grid.node + k]
             reserve *= (1.0 + grid.tilt_square * wheel[RADIUS, grid.node + k] * second) ** 2
         if abs(coarse) < reserve and not exact:  # the node may have left its rail cell: its sign is not safe
@@ -249,8 +256,10 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
 
 @jit(allocates=False)
 def planar_error_bound(geometry, side, y, z, ex, ey, ez):
-    """Bound (m) of the normal penetration that planar detection misses for one wheel, from yaw and contact angle; 0
-    where no strip comes near the rail. Arguments as for :func:`find_patches`."""
+    """Upper bound (m) of the normal penetration that planar detection misses for one wheel.
+
+    The bound depends on yaw and contact angle; it is 0 where no strip comes near the rail. Arguments:
+    :func:`find_patches`."""
     pose = make_pose(side, y, z, ex, ey, ez, False)
     window = make_window(geometry, pose)
     grid, wheel, rail = window.grid, geometry.scan_wheel, geometry.scan_rail
@@ -265,14 +274,16 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
         while near > 0:
             begin, end, near = first_zone(near, geometry.block)
             bound = max(bound, planar_bound(grid, yaw_square, wheel, rail, begin, end))
-    # the law is of first order in yaw; the next order is psi^2 (1 + R'^2) of it: below 2 % up to 50 mrad on the flange
+    # The bound is of lowest order in yaw; the next order is psi^2 (1 + R'^2) of it: < 2 % up to 50 mrad on the flange.
     return 1.05 * bound
 
 
 @jit(allocates=False, forceinline=True)
 def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patch):
-    """Patch of the only overlap of a zone that begins at strip ``begin``: 1, 0 without penetration, -1 if too narrow.
-    ``overlap`` and the sums m0, m1, m2: see `scan`."""
+    """Fill ``patch`` from the only overlap of a zone that begins at strip ``begin``.
+
+    Returns 1, or 0 without penetration, or -1 if the overlap holds too few nodes. `scan` returns ``overlap`` and the
+    sums m0, m1, m2."""
     wheel, start = geometry.scan_wheel, geometry.scan_wheel_start + (grid.node + begin) * SCAN_STEP
     outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
     if reduction == MAXIMUM:
@@ -294,14 +305,14 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
 
 @jit(allocates=False, forceinline=True)
 def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
-    """Patches of the strips from ``begin`` to before ``end``, added to ``count`` others; returns their new number."""
+    """Add the patches of the strips ``begin`` to ``end`` - 1 to the ``count`` present ones; return the new number."""
     grid = window.grid
     if end - begin > MOST_STRIPS:
         return _search(geometry, pose, grid, reduction, begin, end - 1, patches, count)
     m0, m1, m2, overlap, close = scan(window, geometry.scan_wheel, geometry.scan_rail, begin, end)
     if close.count == 0:
         return count
-    # one overlap, and next to its ends no more close strips than its own flanks make
+    # A single overlap: all strips with a small gap belong to it or to its flanks.
     one_overlap = overlap.count > 0 and overlap.last - overlap.first + 1 == overlap.count
     one_overlap = one_overlap and close.last - close.first + 1 == close.count
     one_overlap = one_overlap and overlap.first - close.first <= _FLANK and close.last - overlap.last <= _FLANK
@@ -314,13 +325,13 @@ def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
 
 @jit(allocates=False, forceinline=True)
 def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
-    """Number of contact patches of one wheel, which fill ``patches`` (MAX_PATCHES, PATCH_COLUMNS) from the flange side
-    to the field side in the columns U_WHEEL to CURVATURE_Y.
+    """Find the contact patches of one wheel, fill ``patches`` and return their number.
 
-    ``side`` is +1 left, -1 right; the wheelset's centre y, z (m) and the wheel's outward axle direction ex, ey, ez
-    (unit vector) are in the track frame. X counts from the wheelset's cross-section, the curvatures are A and B of the
-    gap A x^2 + B y^2 (1/m). Two overlaps separated by less than the scan's step of 0.6 mm count as one: patches so
-    close carry load as one."""
+    ``patches`` (MAX_PATCHES, PATCH_COLUMNS) is filled from the flange side to the field side in the columns U_WHEEL to
+    CURVATURE_Y. ``side`` is +1 left, -1 right. The wheelset's centre y, z (m) and the wheel's outward axle direction
+    ex, ey, ez (unit vector) are in the track frame. X is measured from the wheelset's cross-section. The curvatures are
+    A and B of the gap A x^2 + B y^2 (1/m). Two overlaps less than the scan step of 0.6 mm apart are one patch, because
+    patches so close carry load together."""
     pose = make_pose(side, y, z, ex, ey, ez, spatial)
     window = make_window(geometry, pose)
     node, cells = window.grid.node, geometry.scan_rail.shape[1]
@@ -329,7 +340,7 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     if leaves_cells(pose):
         nodes = geometry.scan_wheel.shape[1]
         return _search(geometry, pose, window.grid, reduction, -nodes, nodes, patches, np.int64(0))
-    count = np.int64(0)  # of one type with what is handed over above: one copy of the search
+    count = np.int64(0)  # same type as in the call above, so that `_search` is compiled once
     near = near_blocks(geometry, window)
     while near > 0:
         begin, end, near = first_zone(near, geometry.block)
@@ -339,7 +350,9 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
 
 @dataclass(frozen=True)
 class HertzPatch:
-    """One contact patch in the track frame (x from the wheelset's cross-section); SI units, angles in rad."""
+    """Position, penetration and curvatures of one contact patch; SI units, angles in rad.
+
+    Positions are in the track frame, with x from the wheelset's cross-section."""
 
     side: str
     u_wheel_m: float
@@ -355,20 +368,22 @@ class HertzPatch:
 
 
 def axle_direction(roll, yaw):
-    """Direction of the axle, pointing left: (-sin yaw cos roll, cos yaw cos roll, sin roll)."""
+    """Unit vector of the axle, pointing left: (-sin yaw cos roll, cos yaw cos roll, sin roll)."""
     return -np.sin(yaw) * np.cos(roll), np.cos(yaw) * np.cos(roll), np.sin(roll)
 
 
 def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="maximum"):
-    """List of `HertzPatch` of both wheels of a wheelset, centre at y, z (m) in the track frame, with roll and yaw
-    (rad): left wheel first, from flange to field side. ``detection`` is planar or spatial, ``reduction`` maximum or
-    moment."""
+    """Return the contact patches of both wheels of a wheelset as a list of `HertzPatch`.
+
+    The wheelset's centre is at y, z (m) in the track frame; ``roll`` and ``yaw`` are in rad. The left wheel is first;
+    patches of a wheel are sorted from flange to field side. ``detection`` is planar or spatial, ``reduction`` maximum
+    or moment."""
     if detection not in ("planar", "spatial"):
         raise InputError("detect", "detection", f"expected planar or spatial, got {detection!r}")
     if reduction not in REDUCTIONS:
         raise InputError("detect", "reduction", one_of(REDUCTIONS, reduction))
     axle = axle_direction(roll, yaw)
-    found, geometry = [], Handle(geometry)  # as in runs, which share the kernel
+    found, geometry = [], Handle(geometry)  # the same argument type as in runs, so that both share one kernel
     for side, sign in (("left", 1.0), ("right", -1.0)):
         rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
         sided = (sign * c for c in axle)

@@ -1,4 +1,4 @@
-"""Wheel, rail and their placement compiled for the contact search: plain arrays with equally spaced nodes."""
+"""Data of the contact search: profiles and positions of wheel and rail as arrays with equally spaced nodes."""
 
 import math
 from typing import NamedTuple
@@ -7,50 +7,51 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 SCAN_STEP = 0.6e-3
-"""Distance of the nodes of the scan for overlaps, m. Where a patch may be narrower, the search looks closer."""
+"""Node spacing of the scan for overlaps, m. Where a patch may be narrower, points between nodes are evaluated too."""
 
 # Columns of the profile arrays.
 VALUE, SLOPE, CURVATURE = range(3)
-# Rows of the strip arrays (scan, fine and spread); with along = tilt R' a strip's radius has the shares
-# R along = tilt ALONG and R sqrt(1 - along^2) = R - tilt^2 (DOWN_2 + tilt^2 (DOWN_4 + tilt^2 DOWN_6)) to along^8/26.
+# Rows of the strip arrays (scan, fine and spread). With along = tilt R' the components of a strip's radius are
+# R along = tilt ALONG and R sqrt(1 - along^2) = R - tilt^2 (DOWN_2 + tilt^2 (DOWN_4 + tilt^2 DOWN_6)); the series has
+# an error of along^8/26.
 RADIUS, ALONG, DOWN_2, DOWN_4, DOWN_6 = range(5)
 # Further rows of the scan arrays.
 WHEEL_RESERVE, RADIUS_SLOPE, WHEEL_COSINE = range(5, 8)
 RAIL_RESERVE, RAIL_COSINE = 4, 5
 
 LANES = 8
-"""Strips are taken in multiples of this: whole vector registers."""
+"""Strips per vector register; strips are evaluated in multiples of this number."""
 
 SPREAD = 4
-"""Of the profile's own nodes each of so many is a spread one."""
+"""Ratio of the spacing of the spread nodes to that of the profile's nodes: every fourth node is a spread node."""
 
 _MOST_BLOCKS = 56
-"""Blocks that are told apart: of the 64 bits of a word, in whole registers, one left over."""
+"""Maximum number of blocks: each has a bit of a 64-bit word, in whole registers, and at least one bit stays unused."""
 
 MARGIN = 4
 SAFETY = 1.5
-"""Covers what roll and yaw add to a profile's second derivative."""
+"""Safety factor for the effect of roll and yaw on a profile's second derivative."""
 SECOND_BOUND = 8.0 / (SAFETY * SCAN_STEP**2)
 """Bound of a second derivative (1/m) over its reserve (m)."""
 
 LARGEST_OFFSET = 0.6 * SCAN_STEP
-"""Distance by which the scan's nodes may leave their rail cell, m; the second reserve covers what that costs."""
+"""Maximum distance by which the scan's nodes may leave their rail cell, m; the second reserve covers the error."""
 OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE = 0.03, 1.5
-"""What roll and yaw^2 move a strip sideways, m: by its radius' difference to the tape circle (0.03 m at the flange tip)
-and by R R' psi^2 (R R' = 1.5 m on a flange of 70 degrees)."""
+"""Lateral displacement of a strip per roll (m/rad) and per yaw^2 (m/rad²): the difference of its radius to that at the
+tape circle (0.03 m at the flange tip), and R R' (1.5 m on a flange of 70 degrees)."""
 
 PARTS = 4
-"""Parts of a scan cell that bounds of gaps are told apart for."""
+"""Parts of a scan cell with separate bounds of gaps."""
 
 SMALL_SHARE = 0.15
-"""Share of LARGEST_OFFSET up to which tighter bounds hold."""
+"""Fraction of LARGEST_OFFSET up to which the tighter of two tables of bounds holds."""
 
 YAW_LIMIT = 0.02
 """Yaw (rad) up to which `zone_planar_errors` holds."""
 
 
 class ContactGeometry(NamedTuple):
-    """Wheel, rail and their placement, for kernels."""
+    """Profiles and positions of one wheel and one rail, for kernels."""
 
     wheel: np.ndarray
     """(n, 3): R - r0, R', R'' for Hertz; without r0, so that rounding does not spoil slopes."""
@@ -61,23 +62,24 @@ class ContactGeometry(NamedTuple):
     R = 0."""
     scan_rail: np.ndarray
     """(6, cells): the rail in each scan cell as a cubic of the distance from the cell's start (4 coefficients), the
-    reserve, and the cosine of its inclination; padding lies 1 m below the track. The reserves of a wheel node and its
-    rail cell together bound how much deeper than the nodes the gap between them can go (M h^2/8)."""
+    reserve, and the cosine of its inclination; padding lies 1 m below the track. Between two nodes the gap is less than
+    at the nodes by at most the sum of the reserves of wheel node and rail cell (M h^2/8)."""
     zone_gaps: np.ndarray
-    """(shifts 2 PARTS, blocks): see `_zone_gaps`; of each shift poses of small angles first."""
+    """(shifts 2 PARTS, blocks): lower bounds of gaps, see `_zone_gaps`; in each shift, those for small angles first."""
     zone_planar_errors: np.ndarray
-    """(shifts, blocks): see `zone_planar_errors`."""
+    """(shifts, blocks): penetration over yaw^2 that planar detection can miss, see `zone_planar_errors`."""
     block: int
     """Strips per block: LANES, or a multiple of it where the rail is very wide."""
     fine_wheel: np.ndarray
-    """(5, n + LANES): strip rows at the profile's own nodes, and padding."""
+    """(5, n + LANES): strip rows at the nodes of the wheel profile, and padding."""
     fine_rail: np.ndarray
-    """(4, m - 1 + LANES): the rail between its own nodes, as in ``scan_rail``, and padding; padding alone where the two
-    spacings differ."""
+    """(4, m - 1 + LANES): cubics of the rail between the nodes of its profile, as in ``scan_rail``, and padding; only
+    padding if the node spacings of wheel and rail differ."""
     spread_wheel: np.ndarray
-    """(5, n / SPREAD + LANES): ``fine_wheel`` at its spread nodes, from the first on, and padding."""
+    """(5, n / SPREAD + LANES): every SPREAD-th column of ``fine_wheel``, beginning with the first, and padding."""
     spread_rail: np.ndarray
-    """(SPREAD, 4, m / SPREAD + LANES): ``fine_rail`` in as many cells, from each of the first on."""
+    """(SPREAD, 4, m / SPREAD + LANES): every SPREAD-th cell of ``fine_rail``, beginning with each of its first SPREAD
+    cells."""
     wheel_start: float
     wheel_step: float
     rail_start: float
@@ -87,19 +89,19 @@ class ContactGeometry(NamedTuple):
     rolling_radius: float
     """Radius r0 at the tape circle, m."""
     half_distance: float
-    """Tape circle from the wheelset's centre, m."""
+    """Distance of the tape circle from the wheelset's centre, m."""
     rail_distance: float
-    """Rail profile origin from the track's centre line, m."""
+    """Distance of the rail profile's origin from the track's centre line, m."""
     along: np.ndarray | tuple = ()
-    """(m, 5) where the rail changes along the track, at the rail's nodes: see
+    """(m, 5): corrections of a strip at the rail's nodes if the rail changes along the track, else (). See
     `wrcore.contact.changing_rails.sections`."""
     over: np.ndarray | tuple = ()
-    """(n, 1 + m): stations along the track, evenly apart, from the wheelset's cross-section, m; how much higher than at
-    its nodes the rail is there, as it is, not as a parabola, m: for grids."""
+    """(n, 1 + m): equally spaced stations along the track, from the wheelset's cross-section, m, and the height of the
+    rail over its section at each node of the profile, m: the true height, not a parabola. For contact on grids."""
 
 
 def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
-    """ContactGeometry of the profiles of a `WheelOnRail` and its lengths."""
+    """Return the `ContactGeometry` of the profiles and lengths (m) of a `WheelOnRail`."""
     scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
     gaps = zone_gaps(scan_wheel, scan_rail, block, rolling_radius)
@@ -116,7 +118,9 @@ def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
 
 
 def _reserve(curve, nodes):
-    """M h^2/8 around scan nodes, m: M from differences of the exact slopes within one step of the node."""
+    """Reserves M h^2/8 (m) at scan nodes, with the maximum second derivative M within one scan step of the node.
+
+    Second derivatives are differences of the exact slopes."""
     second = np.abs(np.diff(curve.df) / np.diff(curve.u))
     second = np.maximum(np.append(second, second[-1]), np.insert(second, 0, second[0]))
     first = np.searchsorted(curve.u, nodes - SCAN_STEP, side="left")
@@ -126,7 +130,7 @@ def _reserve(curve, nodes):
 
 
 def _wheel_scan(wheel, rolling_radius, window):
-    """Scan nodes of the wheel, padded by one window of rail cells on either side, and where they start."""
+    """Return the wheel's rows at the scan nodes, padded by ``window`` nodes on either side, and the first node (m)."""
     count = int((wheel.u[-1] - wheel.u[0]) / SCAN_STEP + 1e-9) + 1
     u = wheel.u[0] + SCAN_STEP * np.arange(count)
     nodes = np.zeros((8, count + 2 * window))
@@ -138,12 +142,12 @@ def _wheel_scan(wheel, rolling_radius, window):
 
 
 def _whole(count):
-    """The next multiple of LANES."""
+    """Return the smallest multiple of LANES that is not less than ``count``."""
     return LANES * math.ceil(count / LANES)
 
 
 def _strip_rows(radius, slope):
-    """Rows RADIUS to DOWN_6 from R and R'."""
+    """Return the rows RADIUS to DOWN_6 from R and R'."""
     square = slope**2
     return np.stack([radius, radius * slope, radius * square / 2, radius * square**2 / 8, radius * square**3 / 16])
 
@@ -153,39 +157,41 @@ def _padded(rows):
 
 
 def _spread(cells):
-    """See ``spread_rail``; all of one length, of cells that there are."""
+    """Return `ContactGeometry.spread_rail`; all parts have the same number of cells."""
     count = cells.shape[1] // SPREAD
     return np.stack([_padded(cells[:, first::SPREAD][:, :count]) for first in range(SPREAD)])
 
 
 def zone_gaps(wheel, rail, block, rolling_radius):
-    """Lower bounds of gaps, so that the scan can leave out what is far from contact: see `_zone_gaps`; of each shift
-    those for small angles first."""
+    """Lower bounds of gaps (m), with which the scan skips strips far from contact.
+
+    See `_zone_gaps`; for each shift, the bounds for small angles come first."""
     limits = SMALL_SHARE * LARGEST_OFFSET, LARGEST_OFFSET
     gaps = [_zone_gaps(wheel, rail, block, rolling_radius, limit) for limit in limits]
     return np.concatenate(gaps, 1).reshape(-1, gaps[0].shape[2])
 
 
 def _zone_gaps(wheel, rail, block, rolling_radius, limit):
-    """Entry (shift, part, block): at height 0 and roll 0 no strip of the block, a run of rail cells, comes closer than
-    this to being close (see `scan`), if the first wheel node is ``shift`` and the strips stand in the part
-    ``part`` of PARTS of their cells. Roll and yaw of a `scan.cell_offset` up to ``limit`` move a strip by up to
-    ``offset`` from there, and only upwards but for ``sag``."""
+    """Lower bounds (m) of gap minus reserves in each block of rail cells, at height 0 and roll 0: (shift, part, block).
+
+    ``shift`` is the number of the first wheel node. The strips lie in the part ``part`` of PARTS of their cells. Roll
+    and yaw with a `scan.cell_offset` up to ``limit`` move a strip laterally by at most ``offset`` and down by at most
+    ``sag``."""
     cells = rail.shape[1]
     radius, along = wheel[RADIUS], np.abs(wheel[ALONG])
     tilt_square, roll = limit / OFFSET_PER_YAW_SQUARE, limit / OFFSET_PER_ROLL
-    # lateral: roll times the radius' difference, yaw by R R' psi^2, and the axle's foreshortening along the profile
+    # lateral: roll times the difference of radii, R R' psi^2 by yaw, and the foreshortening of the axle
     offset = (np.abs(radius - rolling_radius) + tilt_square * wheel[DOWN_2]) * roll + tilt_square * along
     offset += 0.51 * SCAN_STEP * np.arange(wheel.shape[1]) * max(tilt_square, roll * roll)
     offset = sliding_window_view(1.01 * offset, cells)
-    sag = along * 0.25 * tilt_square * roll  # R R' tilt^2 ez: at most where half the limit is used up by either
+    sag = along * 0.25 * tilt_square * roll  # R R' tilt^2 ez: maximum where roll and yaw each take half the limit
     reserves = 1.0 + (limit / LARGEST_OFFSET) ** 2
     height = sliding_window_view(-radius - sag - reserves * wheel[WHEEL_RESERVE], cells) - reserves * rail[RAIL_RESERVE]
     c0, c1, c2, c3 = rail[:4]
     gaps = np.full((len(height), PARTS, _whole(cells // block)), 1.0)
     for part in range(PARTS):
         low, high = part / PARTS * SCAN_STEP - offset, (part + 1) / PARTS * SCAN_STEP + offset
-        # highest point of a cubic over an interval: its ends, and how far it can rise above their chord
+        # bound of a cubic over an interval: its higher end, and its maximum height over the chord
         top = np.maximum(*(c0 + d * (c1 + d * (c2 + d * c3)) for d in (low, high)))
         bend = np.maximum(*(np.abs(2.0 * c2 + 6.0 * c3 * d) for d in (low, high)))
         gap = height - top - 0.125 * bend * (high - low) ** 2
@@ -194,7 +200,9 @@ def _zone_gaps(wheel, rail, block, rolling_radius, limit):
 
 
 def zone_planar_errors(wheel, rail, block):
-    """Largest penetration, over yaw^2 up to YAW_LIMIT, that planar detection can miss in each block (shift, block)."""
+    """Maximum penetration over yaw^2 (m/rad²) that planar detection can miss in each block: (shift, block).
+
+    Valid for yaw up to YAW_LIMIT."""
     cells = rail.shape[1]
     missed = YAW_LIMIT**2 * 0.5 * SECOND_BOUND * rail[RAIL_RESERVE] * sliding_window_view(wheel[ALONG] ** 2, cells)
     missed += sliding_window_view(wheel[DOWN_2], cells)
@@ -204,7 +212,7 @@ def zone_planar_errors(wheel, rail, block):
 
 
 def _fine_rail(wheel, rail):
-    """Cubics of the rail between its nodes, or none if wheel and rail nodes are not equally far apart."""
+    """Cubics of the rail between its nodes; an empty array if wheel and rail have different node spacings."""
     step = rail.spacing
     if abs(wheel.spacing - step) > 1e-9 * step:
         return np.zeros((4, 0))
@@ -219,7 +227,7 @@ def _cubics(f, df, step):
 
 
 def _rail_scan(rail):
-    """Scan cells of the rail, padded to whole blocks, where they start, and the size of a block."""
+    """Return the scan cells of the rail, padded to whole blocks, their start (m), and the number of cells per block."""
     count = int((rail.u[-1] - rail.u[0]) / SCAN_STEP + 1e-9)
     u = rail.u[0] + SCAN_STEP * np.arange(count + 1)
     f, df = rail(u), rail(u, 1)

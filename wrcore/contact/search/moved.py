@@ -1,11 +1,11 @@
-"""What a patch by moments becomes when its wheel moves a little, without another search.
+"""Derivatives of a patch by moments with respect to small displacements of its wheel, without another search.
 
-The strips of an overlap are fixed in the wheel, and the gap g of one changes by the displacement of its point normal
-to the rail, dp_z - f' dp_y with the rail's slope f'; yaw moves the point along the strip's circle, too. So
+The strips of an overlap are fixed in the wheel. The gap g of a strip changes by dp_z - f' dp_y, with the displacement
+dp of its point and the rail's slope f'. Yaw also moves the point on the circle of the strip. The differential is
 
     dM_k = 2 sum of g dg u^k
 
-over the nodes from which the search has M_k, and the moved patch follows from the moved moments.
+over the nodes of the search's sums M_k. The displaced patch follows from the displaced moments.
 """
 
 import math
@@ -43,38 +43,38 @@ from wrcore.kernels.jit import FUSED, jit
 
 ACROSS, UP, ROLL, YAW = range(4)
 MOVES = 4
-"""Moves of a wheel that move its patches."""
+"""Number of displacements of a wheel that displace its patches."""
 
 DIFFERENCE = 1e-9
-"""Of moves, m and rad: no search rounds what they lead to."""
+"""Step of the displacements, m and rad. It can be so small because there is no search whose rounding would matter."""
 
 ROUNDING = 1e-6
-"""Of places among nodes, in steps."""
+"""Tolerance of a position relative to the nodes, in node spacings."""
 
 TREAD, MANY = 0.9928, 20
-"""Overlaps where the normal has at least this cosine are summed over the profile's spread nodes if they have so many of
-them, 4 mm: that costs their place 0.01 um."""
+"""Minimum cosine of the contact angle, and minimum number of spread nodes (4 mm), of an overlap that is summed over
+spread nodes. The error of its position is 0.01 µm."""
 
 STEEP = 10.0
-"""Slope of a gap beyond any of profiles."""
+"""Slope of a gap that exceeds all slopes of profiles; a steeper gap marks the end of a profile."""
 
 
 class Nodes(NamedTuple):
-    """Strips at some nodes over an overlap."""
+    """Strips at the nodes over an overlap, and their spacing ``step`` (m)."""
 
     grid: Grid
     u: float
     ur: float
-    """Wheel coordinate of the first one, and where the cell below it begins on the rail, m."""
+    """Rail coordinate of the start of the cell below the first strip, m; ``u`` is the strip's wheel coordinate, m."""
     step: float
     first: int
     end: int
-    """Those that count, from the first one."""
+    """End of the range of strips that are summed, ``first`` to ``end`` - 1."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _put(sums, row, scale, square, across, up, rolled, yawed):
-    """Write a row of sums of g^2 and g dg."""
+    """Write a row of ``sums``: the integral of g^2 u^k and its derivatives 2 g dg u^k, from sums over nodes."""
     sums[row, 0], scale = scale * lanes.total(square), 2.0 * scale
     sums[row, 1 + ACROSS], sums[row, 1 + UP] = scale * lanes.total(across), scale * lanes.total(up)
     sums[row, 1 + ROLL], sums[row, 1 + YAW] = scale * lanes.total(rolled), scale * lanes.total(yawed)
@@ -82,9 +82,10 @@ def _put(sums, row, scale, square, across, up, rolled, yawed):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
-    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; unless
-    ``whole``, only with M0 and M1 and, of this one, what it changes by across and up. Returns the number of nodes in
-    overlap, the first and the last one."""
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and their derivatives in each displacement.
+
+    Unless ``whole``, M2 and the derivatives of M1 with respect to roll and yaw are left out. Returns the number of
+    nodes in overlap, the first and the last one."""
     grid, zero, reach = nodes.grid, lanes.lanes8(0.0), geometry.half_distance + nodes.u
     begin, end = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end))
     ahead, aside = pose.tilt * pose.q, nodes.ur + geometry.rail_distance - pose.side * pose.y
@@ -133,7 +134,8 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _at_node(nodes, wheel, rail, k):
-    """Gap at a node, its height, its distance from the start of the rail's cell below, and the rail's slope there."""
+    """Gap at a node (m), its height (m), its distance from the start of the rail cell below (m), and the rail's
+    slope."""
     d, height = strip_position(nodes.grid, wheel, k)
     cell = np.uint64(nodes.grid.cell + k)
     c1, c2, c3 = rail[1, cell], rail[2, cell], rail[3, cell]
@@ -142,11 +144,10 @@ def _at_node(nodes, wheel, rail, k):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _add_end(geometry, pose, nodes, wheel, rail, inside, outside, sums):
-    """Add what ``sums`` over nodes miss of M0, M1 and their changes, but for yaw, at an end of an overlap between two
-    nodes.
+    """Correct ``sums`` at an end of an overlap between two nodes: M0, M1 and their derivatives, except for yaw.
 
-    There g falls to 0 as a straight line, at theta h from the node inside. Sums of g^2 and of g from there on are short
-    of their integrals by g'^2 h^3 B3(theta) / 3 and g' h^2 B2(theta) / 2, with Bernoulli's polynomials (Euler and
+    Near the end g is linear and reaches 0 at theta h from the node inside. Sums of g^2 and of g over the nodes are less
+    than their integrals by g'^2 h^3 B3(theta) / 3 and g' h^2 B2(theta) / 2, with Bernoulli polynomials (Euler and
     Maclaurin)."""
     node, cell = nodes.grid.node + outside, nodes.grid.cell + outside
     if min(node, cell) < 0 or node >= wheel.shape[1] - LANES or cell >= rail.shape[1] - LANES:
@@ -169,7 +170,7 @@ def _add_end(geometry, pose, nodes, wheel, rail, inside, outside, sums):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scan_nodes(geometry, pose, row):
-    """The scan's nodes over the overlap of a patch."""
+    """Return the scan's `Nodes` over the overlap of the patch ``row``."""
     grid, inverse = make_window(geometry, pose).grid, 1.0 / SCAN_STEP
     start = geometry.scan_wheel_start + grid.node * SCAN_STEP
     first = max(int((row[OUTSIDE] - start) * inverse + ROUNDING) + 1, 0)
@@ -186,7 +187,7 @@ def scan_nodes(geometry, pose, row):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_nodes(geometry, pose, row):
-    """The wheel profile's own nodes there."""
+    """Return the `Nodes` of the wheel profile over the overlap of the patch ``row``."""
     shift, step = fine_cell_shift(geometry, row[U_WHEEL], row[U_RAIL]), geometry.wheel_step
     grid, u, begin, end = fine_grid(geometry, pose, shift, row[OUTSIDE], row[BEYOND])
     return Nodes(grid, u, geometry.rail_start + grid.cell * step, step, 0, end - begin)
@@ -194,8 +195,10 @@ def fine_nodes(geometry, pose, row):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def smooth_nodes(geometry, pose, row):
-    """The same, on a tread only its spread ones if there are many, and the scan's where wheel and rail have nodes of
-    different spacing; and the strip rows of the wheel and the rail's cubics that go with them."""
+    """Return the `Nodes` for smooth sums over the overlap of the patch ``row``, the wheel's strip rows and rail cubics.
+
+    These are the nodes of the wheel profile; on a tread with many nodes, only spread nodes; if the node spacings of
+    wheel and rail differ, the scan's nodes."""
     step = SPREAD * geometry.wheel_step
     if geometry.fine_rail.shape[1] <= LANES:
         return scan_nodes(geometry, pose, row), geometry.scan_wheel, geometry.scan_rail
@@ -208,7 +211,7 @@ def smooth_nodes(geometry, pose, row):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def moved_axle(ex, ey, ez, move, turn):
-    """An axle's direction after a ``turn`` (rad) if the ``move`` is one."""
+    """Direction of the axle after a small rotation ``turn`` (rad) if ``move`` is ROLL or YAW, else unchanged."""
     if move == ROLL:
         return ex, ey - turn * ez, ez + turn * ey
     if move == YAW:
@@ -218,7 +221,7 @@ def moved_axle(ex, ey, ez, move, turn):
 
 @jit(allocates=False, fastmath=FUSED)
 def _narrow(geometry, pose, row):
-    """Middle and half width of an overlap that holds few nodes; NaN where its edges are not found."""
+    """Middle and half width (m) of an overlap that contains few nodes; NaN if its edges are not found."""
     width = row[COSINE] * math.sqrt(row[PENETRATION] / row[CURVATURE_Y])
     low = edge_by_newton(geometry, pose, row[U_WHEEL] - width, row[OUTSIDE], row[BEYOND])
     high = edge_by_newton(geometry, pose, row[U_WHEEL] + width, row[OUTSIDE], row[BEYOND])
@@ -227,8 +230,10 @@ def _narrow(geometry, pose, row):
 
 @jit(allocates=False, fastmath=FUSED)
 def _narrow_slopes(geometry, pose, row, sums):
-    """As `_moment_slopes`, of an overlap that holds few nodes, by Gauss's points between its edges; returns where its
-    middle is, NaN without."""
+    """Fill ``sums`` (see `_moment_slopes`) for an overlap with few nodes, by Gauss quadrature between its edges.
+
+    The moments are about the middle of the overlap. Returns the wheel coordinate of the middle (m), or NaN if the edges
+    are not found."""
     (place, width), tilted = _narrow(geometry, pose, row), -pose.ey / (pose.q * pose.q * pose.q)
     if not width > 0.0:
         return math.nan
@@ -255,8 +260,10 @@ def _narrow_slopes(geometry, pose, row, sums):
 
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_moments(geometry, pose, row, sums):
-    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row``, found by moments and spatially at a pose
-    nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes."""
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row`` and their derivatives (MOVES).
+
+    The ``row`` was found spatially, by moments, at a position and attitude near ``pose``. Returns the wheel coordinate
+    (m) about which the moments are taken, or NaN if there are too few nodes."""
     nodes = scan_nodes(geometry, pose, row)
     if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, True, sums)[0] >= WIDE:
         return nodes.u
@@ -267,8 +274,10 @@ def slopes_of_moments(geometry, pose, row, sums):
 
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_square(geometry, pose, row, sums):
-    """As `slopes_of_moments`, over `smooth_nodes`, and only with what `wrcore.contact.search.approach.pressed_from`
-    wants."""
+    """Fill ``sums`` with M0, M1 and their derivatives for `wrcore.contact.search.approach.pressed_from`.
+
+    The sums are over `smooth_nodes`, with corrections at the ends; the derivatives of M1 with respect to roll and yaw
+    are left out. Returns the wheel coordinate (m) about which M1 is taken, or NaN if there are too few nodes."""
     nodes, wheel, rail = smooth_nodes(geometry, pose, row)
     count, first, last = _moment_slopes(geometry, pose, nodes, wheel, rail, False, sums)
     if count < WIDE:
@@ -281,8 +290,10 @@ def slopes_of_square(geometry, pose, row, sums):
 
 @jit(allocates=False, fastmath=FUSED)
 def move_patch(geometry, pose, row, patch, sums, moved):
-    """Fill ``moved[0, patch]`` with a ``row``, found by moments and spatially, and ``moved[1 + k, patch]`` with what it
-    is after each move by `DIFFERENCE`; False where only a search tells. ``sums`` (3, 1 + MOVES) is scratch."""
+    """Fill ``moved[0, patch]`` with a patch and ``moved[1 + k, patch]`` with the patch after displacement k.
+
+    Each displacement has the size `DIFFERENCE`. The ``row`` of the patch was found spatially, by moments. Returns False
+    if a search is necessary. ``sums`` (3, 1 + MOVES) is scratch."""
     if leaves_cells(pose):
         return False
     middle = slopes_of_moments(geometry, pose, row, sums)

@@ -1,12 +1,13 @@
-"""From an overlap of wheel and rail to a Hertz patch: two reductions.
+"""Two reductions of an overlap of wheel and rail to a Hertz patch.
 
-* ``maximum`` (the paper's): the point of greatest penetration, where wheel and rail slopes agree, and the curvatures of
-  both profiles there. Its result jumps when another point becomes the deepest one and where curvatures jump.
+* ``maximum`` (the paper's): the point of maximum penetration, where wheel and rail slopes agree, with the curvatures of
+  both profiles at this point. Its result jumps when another point becomes the deepest one and where curvatures jump.
 * ``moment``: the Hertz patch whose parabolic overlap g = -(d0 - B e^2) has the same first three moments of g^2,
 
       M_k = int g^2 u^k du:   e_c = M1/M0,   w^2 = 7 (M2/M0 - e_c^2),   d0 = sqrt(15 M0 / (16 w)),   B = d0/w^2.
 
-  It is exact for constant curvatures, needs no curvature, and follows an asymmetric patch smoothly.
+  It is exact for constant curvatures and does not use the profiles' curvatures. Its result is continuous for an
+  asymmetric patch.
 """
 
 import math
@@ -35,20 +36,20 @@ REDUCTIONS = {"maximum": 0, "moment": 1}
 MAXIMUM, MOMENT = 0, 1
 
 MAX_PATCHES = 3
-"""Patches kept per wheel; tread, flange root and flange can touch at once."""
+"""Maximum number of patches per wheel; tread, flange root and flange can touch at once."""
 
 CURVATURE_FLOOR = 0.5
-"""Smallest relative curvature that ``maximum`` hands to Hertz, 1/m (radius 2 m; where profiles are conformal, or even
-interpenetrate more at the sides, the curvature at one point says nothing about the patch)."""
+"""Minimum relative curvature of the reduction ``maximum``, 1/m (radius 2 m). Where profiles are conformal, or the
+overlap is even deeper at its sides, the curvature at one point does not describe the patch."""
 
-# Columns of the patch array: geometry first, then what the forces add (wrcore.wheels.hertzian_force).
+# Columns of the patch array: first geometry, then results of the force model (wrcore.wheels.hertzian_force).
 U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y = range(10)
 SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
-OUTSIDE, BEYOND = 10, 11  # of a patch by moments, until it has a force: points without overlap next to its own, m
+OUTSIDE, BEYOND = 10, 11  # patch by moments, before SEMI_A, SEMI_B: points without overlap on either side, m
 COSINE, SINE = 19, 20  # of the contact angle
-P_MAX = 21  # filled where patches are no ellipses
-PSI = 22  # shape number, filled where the creep table asks for it
-CELL = 22  # in its place, of patches on strips: the cell in which they were looked up, 0 where they were solved
+P_MAX = 21  # maximum pressure, filled for non-elliptical patches
+PSI = 22  # shape number, filled where the creep table needs it
+CELL = 22  # same column, patches on strips: cell of the lookup table, 0 for patches that were solved directly
 PATCH_COLUMNS = 23
 
 CHANNELS = {
@@ -56,28 +57,30 @@ CHANNELS = {
     "contact_angle_rad": ANGLE, "penetration_m": PENETRATION, "a_m": SEMI_A, "b_m": SEMI_B, "N_N": NORMAL,
     "Fx_N": FX, "Fy_N": FY, "Mz_Nm": MZ, "xi": XI, "eta": ETA, "phi_per_m": PHI,
 }  # fmt: skip
-"""Columns of the patch array by the names that runs and tables give them."""
+"""Columns of the patch array by their names in runs and tables."""
 
 SLOPE_TOLERANCE = 1e-12
-"""Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
+"""Tolerance of the slope difference at a contact point. The point then has an error of about 1e-13 m, on nearly
+conformal pairs of 1e-11 m."""
 
 _LOOSE_TOLERANCE = 1e-9
-"""Slopes agree to this where only a start for the overlap's edges is wanted."""
+"""Tolerance of the slope difference where the point only starts the search for the overlap's edges."""
 
 _LAST_STEP = 2e-5
-"""A Newton step towards an edge that is smaller than this (m) leaves less than ``_EDGE_TOLERANCE`` behind."""
+"""Newton step towards an edge (m) below which the error of the edge is less than ``_EDGE_TOLERANCE``."""
 
 _EDGE_TOLERANCE = 4e-7
-"""Edges of an overlap are right to this, m; what is left of the integral of g^2 is of third order in it."""
+"""Tolerance of the edges of an overlap, m. The error of the integral of g^2 is of third order in it."""
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @jit(allocates=False)
 def deepest_point(geometry, pose, u, tolerance, outside, beyond):
-    """Lateral wheel coordinate between ``outside`` and ``beyond`` where the slopes agree, from ``u``: Newton's steps
-    inside a shrinking bracket. What lies beyond belongs to other overlaps. Returns ``u`` itself where there is none
-    (edge of a profile)."""
+    """Lateral wheel coordinate (m) of the deepest point of an overlap, where the slopes of wheel and rail agree.
+
+    Newton steps start at ``u`` and stay inside a shrinking bracket, at first from ``outside`` to ``beyond``; points
+    outside it belong to other overlaps. Returns ``u`` if the bracket contains no such point (edge of a profile)."""
     low, high, new = outside, beyond, u
     for _ in range(60):
         value, rate = slope_difference(geometry, pose, new)
@@ -99,7 +102,7 @@ def deepest_point(geometry, pose, u, tolerance, outside, beyond):
 
 @jit(allocates=False)
 def edge_by_newton(geometry, pose, u, low, high):
-    """Zero of the gap from a good guess by a few Newton steps; NaN if that does not settle in (low, high)."""
+    """Zero of the gap (m) by a few Newton steps from the guess ``u``; NaN if they do not converge in (low, high)."""
     for _ in range(6):
         if not low <= u <= high:
             return np.nan
@@ -113,7 +116,7 @@ def edge_by_newton(geometry, pose, u, low, high):
 
 @jit(allocates=False)
 def edge_by_bracket(geometry, pose, outside, inside):
-    """Zero of the gap between a point outside and one inside an overlap (Illinois steps), or the rail's end."""
+    """Zero of the gap (m) between a point outside and a point inside an overlap (Illinois steps), or the rail's end."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
     while high >= 0.5 and abs(outside - inside) > _EDGE_TOLERANCE:  # the rail ends between the two
         new = 0.5 * (outside + inside)
@@ -145,9 +148,11 @@ def edge_by_bracket(geometry, pose, outside, inside):
 
 @jit(allocates=False)
 def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
-    """Both ends of a narrow overlap: from the parabola at its deepest point where that leads there, else by bracketing.
-    ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside; ``deepest`` is a strip near the deepest
-    one."""
+    """Return both ends (m) of a narrow overlap.
+
+    Newton steps start from the parabola at its deepest point; where they do not converge, the end is found by
+    bracketing. ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside the overlap; ``deepest`` is a
+    strip near its deepest point."""
     u = deepest_point(geometry, pose, deepest, _LOOSE_TOLERANCE, outside, beyond)
     gap, rate = gap_at(geometry, pose, u)[0], slope_difference(geometry, pose, u)[1]
     start = end = np.nan
@@ -164,7 +169,8 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
 
 @jit(allocates=False)
 def overlap_moments(geometry, pose, first, last):
-    """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature in panels, M1 and M2 about the middle."""
+    """Moments M0, M1, M2 of g^2 over [first, last], M1 and M2 about the middle, by Gauss-Legendre quadrature in
+    panels."""
     panels = int((last - first) / SCAN_STEP) + 1
     middle, half = 0.5 * (first + last), 0.5 * (last - first) / panels
     m0 = m1 = m2 = 0.0
@@ -181,9 +187,10 @@ def overlap_moments(geometry, pose, first, last):
 
 @jit(allocates=False, forceinline=True)
 def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration, patch):
-    """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
-    ``rail_z`` is the rail's height at ``ur``, ``slope`` the contact plane's over the rail's lateral coordinate, ``u``,
-    ``along`` and ``radius`` the wheel's strip."""
+    """Fill the position columns of a patch, which lies midway between the undeformed surfaces (equal materials).
+
+    ``rail_z`` is the rail's height at ``ur``, ``slope`` the slope of the contact plane over the rail's lateral
+    coordinate. ``u``, ``along`` and ``radius`` describe the wheel's strip."""
     secant = math.sqrt(1.0 + slope * slope)
     cosine = 1.0 / secant
     dy, _ = radius_direction(pose, along)
@@ -201,7 +208,7 @@ def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration
 
 @jit(allocates=False, forceinline=True)
 def _arc_tangent(x):
-    """atan x; its series where seven terms give it to rounding."""
+    """Return atan x; for small x from a series of eight terms, with errors at the level of rounding."""
     s = x * x
     if s > 0.01:
         return math.atan(x)
@@ -212,7 +219,7 @@ def _arc_tangent(x):
 
 @jit(allocates=False, forceinline=True)
 def _arc_sine(x):
-    """asin x; its series where eight terms give it to rounding."""
+    """Return asin x; for small x from a series of eight terms, with errors at the level of rounding."""
     s = x * x
     if s > 0.01:
         return math.asin(x)
@@ -223,8 +230,9 @@ def _arc_sine(x):
 
 @jit(allocates=False)
 def patch_at_maximum(geometry, pose, u, outside, beyond, patch):
-    """Reduction ``maximum`` from the deepest strip, with points without overlap next to its overlap; returns whether
-    there is penetration."""
+    """Fill ``patch`` by the reduction ``maximum``; return whether there is penetration.
+
+    ``u`` is the deepest strip; ``outside`` and ``beyond`` are points without overlap on either side of its overlap."""
     u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE, outside, beyond)
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     if not on_rail(geometry, ur):
@@ -262,7 +270,8 @@ def patch_at_maximum(geometry, pose, u, outside, beyond, patch):
 
 @jit(allocates=False, forceinline=True)
 def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
-    """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
+    """Fill ``patch`` by the reduction ``moment`` from the moments of g^2 about ``middle``; return whether there is
+    penetration."""
     if not m0 > 0.0:
         return False
     inverse = 1.0 / m0

@@ -1,10 +1,10 @@
-"""The scan: gaps of the strips of a wheel that can come close to its rail, eight at a time.
+"""Scan of the strips of a wheel near its rail: gaps of eight strips at a time.
 
 Wheel nodes and rail cells have the same spacing, so that the k-th strip lies over the k-th cell and all loads are
-contiguous. What roll and yaw take away from that stays a fraction of a cell, or the search is told so.
+contiguous. Roll and yaw displace the strips by a fraction of a cell; for larger displacements see `leaves_cells`.
 
-Blocks of strips that cannot come close to contact are known from a table of lower bounds (`geometry.zone_gaps`); the
-others form zones, and only these are scanned.
+A table of lower bounds (`geometry.zone_gaps`) excludes blocks of strips that cannot come close to contact. The other
+blocks form zones, and only zones are scanned.
 """
 
 import math
@@ -37,19 +37,19 @@ from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
 
 MOST_STRIPS = 128
-"""Strips that one call of `scan` can tell apart: the bits of two words."""
+"""Maximum number of strips in one call of `scan`: it has a bit for each strip in two words of 64 bits."""
 
 
 class Grid(NamedTuple):
-    """How the strips of a wheel (its strip rows, see `geometry`) lie over rail cells of the same spacing (its cubics).
+    """Coefficients of the position of a wheel's strips over rail cells of the same spacing.
 
-    The k-th strip, with its radius' shares ``down`` and ``along``, lies
+    The k-th strip, with the components ``down`` and ``along`` of its radius (strip rows, see `geometry`), lies
     d = lateral + k lateral_rate + down y_down + along y_along from the start of its cell, and at the height
     height + k height_rate + down z_down + along z_along."""
 
     node: int
     cell: int
-    """Those of the strip 0."""
+    """Rail cell below strip 0; ``node`` is the wheel node of strip 0."""
     lateral: float
     lateral_rate: float
     height: float
@@ -62,18 +62,18 @@ class Grid(NamedTuple):
 
 
 class Window(NamedTuple):
-    """The wheel nodes over the rail."""
+    """Strips of a wheel over the rail cells, and limits of the scan."""
 
     grid: Grid
     zone_row: int
-    """Row of ``zone_gaps`` for poses of small angles: by node, and part of a cell that the strips stand in."""
+    """Row of ``zone_gaps`` for small angles, by wheel node and by the part of a rail cell in which the strips lie."""
     reserves: float
-    """Gaps below so many reserves are close: the first one bounds what lies between two nodes, the rest, up to another
-    one, what leaving the rail cell costs (in proportion to the square of the distance)."""
+    """Limit of small gaps as a multiple of the reserve, 1 to 2. The first reserve bounds the gap between two nodes. The
+    part over 1 bounds the error where strips leave their rail cells; it grows as the square of the distance."""
 
 
 class StripRange(NamedTuple):
-    """Which strips of a zone are below some limit, counted from its first one."""
+    """Count, first and last of the strips of a zone with a gap below a limit, numbered from the zone's first strip."""
 
     count: int
     first: int
@@ -82,27 +82,30 @@ class StripRange(NamedTuple):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def cell_offset(pose):
-    """How far roll and yaw may move the scan's nodes away from their rail cells, m."""
+    """Upper bound of the distance by which roll and yaw move the scan's nodes out of their rail cells, m."""
     return OFFSET_PER_ROLL * abs(pose.ez) + OFFSET_PER_YAW_SQUARE * pose.tilt * pose.tilt
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def leaves_cells(pose):
-    """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly. Small
-    angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone."""
+    """Whether the scan's nodes leave their rail cells by too much, so that the rail cell of each strip must be found.
+
+    The limit is 12 mrad of roll without yaw, or 15 mrad of yaw without roll. Angles in real runs are far smaller."""
     return cell_offset(pose) > LARGEST_OFFSET
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def rail_cell(geometry, pose, u):
-    """Rail cell that really lies below the strip at u."""
+    """Number of the rail cell below the strip at wheel coordinate ``u``, for any roll and yaw."""
     ur = strip_point(geometry, pose, u)[0]
     return min(max(int((ur - geometry.scan_rail_start) / SCAN_STEP), 0), geometry.scan_rail.shape[1] - 1)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _grid(pose, node, cell, reach, offset, step):
-    """Strips ``step`` apart, the first one at ``reach`` along the axle over a cell that starts at ``offset``."""
+    """Return the `Grid` of strips with a spacing of ``step`` (m).
+
+    The first strip is at ``reach`` (m) on the axle; its rail cell starts at ``offset`` (m)."""
     side_y = pose.side * pose.ey
     return Grid(
         node, cell, reach * side_y - offset, step * (side_y - 1.0), pose.z + reach * pose.ez,
@@ -113,7 +116,9 @@ def _grid(pose, node, cell, reach, offset, step):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def make_window(geometry, pose):
-    """The scan's strips, one for each rail cell; ``grid.node`` may lie outside the nodes there are."""
+    """Return the `Window` of the scan, with one strip for each rail cell.
+
+    ``grid.node`` may lie outside the wheel's nodes."""
     offset = geometry.rail_distance + geometry.scan_rail_start - pose.side * pose.y
     start = geometry.half_distance + geometry.scan_wheel_start
     position = offset - pose.side * (start * pose.ey + geometry.rolling_radius * pose.y_down)
@@ -127,14 +132,14 @@ def make_window(geometry, pose):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def near_blocks(geometry, window):
-    """Blocks with a strip that can be close, a bit for each."""
+    """Bit set of the blocks in which a strip can have a small gap."""
     small = window.reserves < 1.0 + SMALL_SHARE * SMALL_SHARE
     return _near_blocks(geometry, window.grid, window.zone_row if small else window.zone_row + PARTS, 0.0)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def blocks_with_planar_errors(geometry, window, yaw_square):
-    """Blocks with a strip that can take part in `planar_bound`, a bit for each."""
+    """Bit set of the blocks in which a strip can contribute to `planar_bound`."""
     return _near_blocks(geometry, window.grid, window.zone_row + PARTS, yaw_square)
 
 
@@ -154,7 +159,8 @@ def _near_blocks(geometry, grid, row, yaw_square):
 
 @jit(allocates=False, forceinline=True)
 def first_zone(near, block):
-    """First run of near blocks: its first strip, the strip after its last one, and the bits beyond."""
+    """Return the first strip of the first run of near blocks, the strip after its last one, and the bits of later
+    blocks."""
     first = lanes.lowest_bit(near)
     end = first + lanes.lowest_bit(~(near >> np.uint64(first)))
     return first * block, end * block, near & (~np.uint64(0) << np.uint64(end))
@@ -162,7 +168,7 @@ def first_zone(near, block):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_position(grid, wheel, k):
-    """Distance of the k-th strip from the start of its rail cell, and its height."""
+    """Distance of the k-th strip from the start of its rail cell, and its height, both in m."""
     square, node = grid.tilt_square, np.uint64(grid.node + k)
     down = square * (wheel[DOWN_4, node] + square * wheel[DOWN_6, node])
     down = wheel[RADIUS, node] - square * (wheel[DOWN_2, node] + down)
@@ -173,7 +179,7 @@ def strip_position(grid, wheel, k):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_gap(grid, wheel, rail, k):
-    """Gap of the k-th strip."""
+    """Vertical gap of the k-th strip, m."""
     d, height = strip_position(grid, wheel, k)
     cell = np.uint64(grid.cell + k)
     return height - (rail[0, cell] + d * (rail[1, cell] + d * (rail[2, cell] + d * rail[3, cell])))
@@ -181,7 +187,7 @@ def strip_gap(grid, wheel, rail, k):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def gaps_of_eight(grid, wheel, rail, k):
-    """Gaps of eight strips from the k-th on, as `strip_gap`."""
+    """Vertical gaps of the eight strips k to k + 7, m."""
     square, node = grid.tilt_square, np.uint64(grid.node + k)
     down = square * (lanes.load8(wheel, DOWN_4, node) + square * lanes.load8(wheel, DOWN_6, node))
     down = lanes.load8(wheel, RADIUS, node) - square * (lanes.load8(wheel, DOWN_2, node) + down)
@@ -200,7 +206,7 @@ def _rail_heights(rail, first, d):
 
 @jit(allocates=False, forceinline=True)
 def _strips(low, high):
-    """From a bit for each strip, the first 64 of them in ``low``."""
+    """Return the `StripRange` of the bits set in two words, with strips 0 to 63 in ``low``."""
     first = lanes.lowest_bit(low) if low > 0 else 64 + lanes.lowest_bit(high)
     last = 64 + lanes.highest_bit(high) if high > 0 else lanes.highest_bit(low)
     return StripRange(lanes.count_bits(low) + lanes.count_bits(high), first, last)
@@ -208,9 +214,11 @@ def _strips(low, high):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scan(window, wheel, rail, begin, end):
-    """Sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, from ``begin``, where i = 0, to before ``end``, at
-    most `MOST_STRIPS`: what a single overlap needs; then the `StripRange` with a negative gap, and those with one below
-    ``window.reserves`` times their reserve."""
+    """Sum the moments of a single overlap over the strips ``begin`` to ``end`` - 1, and find strips with small gaps.
+
+    Returns sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, with i = 0 at ``begin``. Then the `StripRange`
+    of strips with a negative gap, and that of strips with a gap below ``window.reserves`` times their reserve. At most
+    `MOST_STRIPS` strips."""
     grid, zero = window.grid, lanes.lanes8(0.0)
     m0, m1, m2 = zero, zero, zero
     overlap_low = overlap_high = close_low = close_high = np.uint64(0)
@@ -233,7 +241,8 @@ def scan(window, wheel, rail, begin, end):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def deepest_strip(grid, wheel, rail, first, last):
-    """The strip that overlaps most along the rail's normal, if the only overlap reaches from ``first`` to ``last``."""
+    """Number of the strip with the maximum penetration along the rail's normal, in one overlap from ``first`` to
+    ``last``."""
     best, chosen = lanes.lanes8(0.0), lanes.lanes8(0.0)
     for k in range(first // LANES * LANES, last + 1, LANES):
         depth = -1.0 * gaps_of_eight(grid, wheel, rail, k) * lanes.load8(rail, RAIL_COSINE, np.uint64(k))
@@ -245,15 +254,17 @@ def deepest_strip(grid, wheel, rail, first, last):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_cell_shift(geometry, u, ur):
-    """Number of the fine rail cell less that of the fine wheel node over it, at wheel u over rail ur."""
+    """Number of the fine rail cell at the rail coordinate ``ur`` minus that of the fine wheel node at ``u`` over it."""
     return int(math.floor((ur - geometry.rail_start - u + geometry.wheel_start) / geometry.wheel_step))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _profile_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, last):
-    """`Grid` of strips ``step`` apart from the profile's first node on, where they lie between ``first`` and ``last``
-    on the wheel (m); where the first one lies, its number, and that after the last one. ``shift``: number of the rail
-    cell below a strip less the strip's."""
+    """Return the `Grid` of the strips at nodes between ``first`` and ``last`` on the wheel (m).
+
+    The nodes have a spacing of ``step`` (m) from the profile's first node. ``shift`` is the number of the rail cell
+    below a strip minus that of the strip. Further results: wheel coordinate (m) and number of the first strip, and the
+    number after that of the last strip."""
     density = 1.0 / step
     begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -shift)
     end = min(int((last - geometry.wheel_start) * density) + 1, wheel.shape[1] - LANES)
@@ -265,9 +276,9 @@ def _profile_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, l
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_grid(geometry, pose, shift, first, last):
-    """`_profile_grid` of the strips at all of the profile's nodes. ``shift``: see `fine_cell_shift`, for the middle of
-    an
-    overlap."""
+    """Return the results of `_profile_grid` for the strips at all nodes of the wheel profile.
+
+    ``shift`` is that of `fine_cell_shift` at the middle of an overlap."""
     return _profile_grid(
         geometry, pose, geometry.fine_wheel, geometry.fine_rail, geometry.rail_start, geometry.wheel_step, shift, first,
         last,
@@ -276,7 +287,8 @@ def fine_grid(geometry, pose, shift, first, last):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def spread_grid(geometry, pose, shift, first, last):
-    """The same at its spread nodes, and the rail's cells below them."""
+    """Return the results of `_profile_grid` at the spread nodes, the rail coordinate (m) of the first rail cell, and
+    the rail cells (4, ...)."""
     part, step = shift % SPREAD, geometry.wheel_step
     rail, start = geometry.spread_rail[part], geometry.rail_start + part * step
     own = _profile_grid(
@@ -287,9 +299,10 @@ def spread_grid(geometry, pose, shift, first, last):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_sums(geometry, pose, shift, first, last):
-    """Integrals of g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``,
-    the position (m) from which e counts, and the number of nodes in overlap, 0 where those of wheel and rail do not go
-    together."""
+    """Integrate g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's nodes between ``first`` and ``last``.
+
+    Returns the three integrals, the wheel coordinate (m) of e = 0, and the number of nodes in overlap. This number is 0
+    if the node spacings of wheel and rail differ."""
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
     grid, origin, begin, end = fine_grid(geometry, pose, shift, first, last)
     zero, size = lanes.lanes8(0.0), lanes.lanes8(float(end - begin))
@@ -307,12 +320,12 @@ def fine_sums(geometry, pose, shift, first, last):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def planar_bound(grid, yaw_square, wheel, rail, begin, end):
-    """Largest normal penetration (m) that planar detection misses where it could matter, at some strips.
+    """Maximum normal penetration (m) that planar detection misses at the strips ``begin`` to ``end`` - 1.
 
     At a strip with slope R' the extreme point lies R R' psi^2 further out, over a rail of the same slope and of second
-    derivative f'': missed is the height R (psi R')^2/2 + |f''| (R R' psi^2)^2/2. The first term, along the normal, is
-    the first-order law r psi^2 tan^2(delta) cos(delta)/2; the second one counts on the flange. It matters where the
-    planar gap is below that height (or its reserve)."""
+    derivative f''. Planar detection misses the height R (psi R')^2/2 + |f''| (R R' psi^2)^2/2. The first term, along
+    the normal, is the first-order law r psi^2 tan^2(delta) cos(delta)/2; the second is significant on the flange. Only
+    strips whose planar gap is below this height plus two reserves contribute."""
     largest = lanes.lanes8(0.0)
     for k in range(begin, end, LANES):
         node = np.uint64(grid.node + k)

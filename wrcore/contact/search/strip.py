@@ -1,14 +1,14 @@
-"""One strip of the wheel against the rail below it.
+"""Gap between one strip of the wheel and the rail below it.
 
 The wheel is cut into strips, each a circle of radius R(u) about the axle. With the side's outward axle direction e,
 a strip's point is P = C + R d with d normal to e, and the wheel's outward normal there is N ~ d - R' e.
 
-* spatial: the strip's extreme point against an extruded rail has no longitudinal normal component, N_x = 0, which is
-  solved in closed form by d_x = R' e_x. No iteration along the rail is needed.
-* planar: the strip's lowest point; the wheel's lowest generator is laid into the cross-section at the wheelset's arc
+* spatial: at the strip's extreme point against an extruded rail the normal has no longitudinal component, N_x = 0.
+  The solution in closed form is d_x = R' e_x, so that no iteration along the rail is needed.
+* planar: the strip's lowest point; the wheel's lowest generator is placed in the cross-section at the wheelset's arc
   length.
 
-A :class:`Pose` holds what all strips of one wheel share, so that a strip costs a few multiplications.
+A :class:`Pose` holds the coefficients that all strips of one wheel share, so that a strip costs a few multiplications.
 """
 
 import math
@@ -22,13 +22,15 @@ from wrcore.contact.search.geometry import CURVATURE, SLOPE, VALUE
 from wrcore.kernels.jit import jit
 
 AHEAD, BEND, LIFT, LEAN, CHANGED = range(5)
-"""Columns of `ContactGeometry.along`, what the rail's change along the track adds to a strip: x of its least gap, half
-of the gap's second derivative along x, the height of the wheel's point there, and x as far as the rail's slope makes
-it: 0 for a wheel out of round on a level rail. `CHANGED`, of the first row: 0 where that is the plain rail."""
+"""Columns of `ContactGeometry.along`: corrections of a strip where the rail changes along the track.
+
+AHEAD: x of the minimum gap (m). BEND: half of the gap's second derivative along x (1/m). LIFT: height of the wheel's
+point at the minimum (m). LEAN: the part of AHEAD that the rail's slope causes (m), 0 for a wheel out of round on a
+level rail. CHANGED, first row only: 0 where the rail has its plain section."""
 
 
 class Pose(NamedTuple):
-    """A wheel's position and the coefficients of its strips, for kernels.
+    """Position and attitude of a wheel and the coefficients of its strips, for kernels.
 
     With ``along = tilt R'`` and ``down = sqrt(1 - along^2)`` a strip at distance c along the axle has
     y = y0 + c ey + R (down y_down + along y_along), and z likewise."""
@@ -51,7 +53,7 @@ class Pose(NamedTuple):
 
 @jit(allocates=False, forceinline=True)
 def make_pose(side, y, z, ex, ey, ez, spatial):
-    """Pose of a wheel from the wheelset's centre and the wheel's outward axle direction."""
+    """Return the `Pose` of a wheel from the wheelset's centre (m) and the wheel's outward axle direction."""
     q = math.sqrt(1.0 - ex * ex)
     r = 1.0 / q
     tilt = ex * r if spatial else 0.0
@@ -60,7 +62,7 @@ def make_pose(side, y, z, ex, ey, ez, spatial):
 
 @jit(allocates=False, forceinline=True)
 def cubic_at(nodes, start, step, u):
-    """Value, slope and second derivative of the cubic Hermite interpolant; end cells are continued outwards."""
+    """Value, slope and second derivative of the cubic Hermite interpolant at ``u``; end cells are extrapolated."""
     inverse = 1.0 / step
     position = (u - start) * inverse
     cell = min(max(int(position), 0), nodes.shape[0] - 2)
@@ -91,7 +93,7 @@ def _added(along, start, step, column, ur, factor, value):
 
 @overload(_with_rail_along, inline="always", jit_options=AS_KERNELS)
 def _of_its_type(along, start, step, column, ur, factor, value):
-    """Nothing at all for rails that are the same everywhere."""
+    """Select the kernel of `_with_rail_along`: for a rail with a constant section it returns ``value`` unchanged."""
     if isinstance(along, types.BaseTuple):
         return lambda along, start, step, column, ur, factor, value: value
     return _added
@@ -99,8 +101,9 @@ def _of_its_type(along, start, step, column, ur, factor, value):
 
 @jit(allocates=False, forceinline=True)
 def with_rail_along(geometry, column, ur, factor, value):
-    """``value`` of a strip over the rail coordinate ``ur``, and ``factor`` times what a rail that changes along the
-    track adds to it (`AHEAD`, `BEND`, `LIFT`)."""
+    """Return ``value`` plus ``factor`` times a correction for a rail that changes along the track.
+
+    The correction is the ``column`` (`AHEAD`, `BEND`, `LIFT` or `LEAN`) at the rail coordinate ``ur`` (m)."""
     return _with_rail_along(geometry.along, geometry.rail_start, geometry.rail_step, column, ur, factor, value)
 
 
@@ -117,7 +120,7 @@ def _changes_by_type(along):
 
 @jit(allocates=False, forceinline=True)
 def changes_along(geometry):
-    """Whether the rail changes along the track: known when a kernel is compiled."""
+    """Whether the rail changes along the track; a constant of each compiled kernel."""
     return _changes(geometry.along)
 
 
@@ -134,7 +137,7 @@ def _changed_by_type(along):
 
 @jit(allocates=False, forceinline=True)
 def changed_here(geometry):
-    """Whether a wheel sees another rail than the plain one where it is."""
+    """Whether the rail at the wheel's present position differs from its plain section."""
     return _changed(geometry.along)
 
 
@@ -152,16 +155,20 @@ def _turn_by_type(along):
 
 @jit(allocates=False, forceinline=True)
 def turn_along(geometry):
-    """Turn what a rail that changes along the track adds to strips end for end, in place: the rail of a wheel that is
-    the mirror image, along x, of the one that has laid it. Done twice, nothing has changed."""
+    """Reverse the x direction of the corrections for a rail that changes along the track, in place.
+
+    The result is the rail under the mirror image, along x, of the wheel for which it was written. A second call
+    restores it."""
     _turn(geometry.along)
 
 
 @jit(allocates=False, forceinline=True)
 def lean_at(geometry, ur, pz):
-    """Cosine and sine of the angle about the axle between the rail's point under the wheel and what it touches where
-    its rail changes along the track: at the rail coordinate ``ur``, ``pz`` (m) over the axle. A body of revolution has
-    no normal there but the one through its axle; under a wheel out of round the rail stays level."""
+    """Cosine and sine of the angle about the axle from the point of the rail below the axle to the contact point.
+
+    The angle is not 0 where the rail's height changes along the track. The contact point is at the rail coordinate
+    ``ur`` and ``pz`` (m) over the axle. The normal of a body of revolution passes through its axle; under a wheel out
+    of round the rail stays level."""
     if not changes_along(geometry):
         return 1.0, 0.0
     ahead = with_rail_along(geometry, LEAN, ur, 1.0, 0.0)
@@ -171,7 +178,8 @@ def lean_at(geometry, ur, pz):
 
 @jit(allocates=False, forceinline=True)
 def leaning(geometry, lean, x, z):
-    """Components of a vector in axes that lean so (`lean_at`): along the contact plane and upright to it."""
+    """Components of a vector (x, z) in axes rotated by the angle of `lean_at`: along and normal to the contact
+    plane."""
     if changes_along(geometry):
         return lean[0] * x + lean[1] * z, lean[0] * z - lean[1] * x
     return x, z
@@ -179,13 +187,13 @@ def leaning(geometry, lean, x, z):
 
 @jit(allocates=False, forceinline=True)
 def upright(geometry, lean, x, z):
-    """Components of a vector of leaning axes along the rail's frame."""
+    """Components in the rail's frame of a vector (x, z) given in the axes of `leaning`."""
     return leaning(geometry, (lean[0], -lean[1]), x, z)
 
 
 @jit(allocates=False, forceinline=True)
 def curvature_at(nodes, start, step, u):
-    """Second derivative for Hertz: its window mean, interpolated linearly."""
+    """Second derivative of a profile for Hertz (1/m): its mean over a window, interpolated linearly between nodes."""
     position = (u - start) / step
     i = min(max(int(position), 0), nodes.shape[0] - 2)
     t = position - i
@@ -194,8 +202,10 @@ def curvature_at(nodes, start, step, u):
 
 @jit(allocates=False, forceinline=True)
 def strip_point(geometry, pose, u):
-    """Extreme point of the strip at wheel coordinate u: rail coordinate below it and its height (m), R, R' and R'' of
-    the interpolated profile, and the longitudinal share of the strip's radius direction, over q."""
+    """Extreme point of the strip at wheel coordinate ``u``.
+
+    Returns the rail coordinate below it and its height (m), R, R' and R'' of the interpolated profile, and the
+    longitudinal component of the strip's radius direction, divided by q."""
     extra, slope, second = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
     radius = geometry.rolling_radius + extra
     along = slope * pose.tilt
@@ -220,7 +230,8 @@ def on_rail(geometry, ur):
 
 @jit(allocates=False, forceinline=True)
 def gap_at(geometry, pose, u):
-    """Vertical gap of the strip at u: negative in overlap, 1 m where there is no rail below; and the rail's slope."""
+    """Vertical gap (m) of the strip at ``u``, and the rail's slope; negative in overlap, 1 m beyond the rail's
+    profile."""
     ur, z, _, _, _, _ = strip_point(geometry, pose, u)
     if not on_rail(geometry, ur):
         return 1.0, 0.0
@@ -230,9 +241,10 @@ def gap_at(geometry, pose, u):
 
 @jit(allocates=False, forceinline=True)
 def wheel_slope(pose, slope, along):
-    """Slope of the wheel in the cross-section over the rail's lateral coordinate. Spatial: the normal d - R' e has no x
-    component, so its y, z part is normal to the tangent in the cross-section. Planar: the generator's tangent,
-    projected."""
+    """Slope of the wheel in the cross-section over the rail's lateral coordinate.
+
+    Spatial: the normal d - R' e has no x component, so its y, z part is normal to the tangent in the cross-section.
+    Planar: the tangent of the generator, projected."""
     if pose.tilt != 0.0:
         dy, dz = radius_direction(pose, along)
         return -pose.side * (dy - slope * pose.ey) / (dz - slope * pose.ez)
@@ -241,7 +253,7 @@ def wheel_slope(pose, slope, along):
 
 @jit(allocates=False, forceinline=True)
 def gap_and_slope(geometry, pose, u):
-    """Vertical gap of the strip at u and its slope over u (but for the small turn by roll and yaw)."""
+    """Vertical gap (m) of the strip at ``u`` and its slope over ``u``, without the small rotation by roll and yaw."""
     ur, z, _, slope, _, along = strip_point(geometry, pose, u)
     f, rail_slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
     return z - f, wheel_slope(pose, slope, along) - rail_slope
@@ -249,9 +261,11 @@ def gap_and_slope(geometry, pose, u):
 
 @jit(allocates=False, forceinline=True)
 def slope_difference(geometry, pose, u):
-    """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate. The
-    difference is negative on the near and positive on the far side of a point of greatest penetration. The rate (1/m)
-    leaves out the small turn of the wheel's slope by roll and yaw: good enough for Newton's steps."""
+    """Slope of the wheel minus slope of the rail below it, and the derivative of this difference over ``u`` (1/m).
+
+    Both slopes are over the rail's lateral coordinate. The difference is negative at smaller and positive at larger
+    ``u`` than a point of maximum penetration. The derivative neglects the small rotation of the wheel's slope by roll
+    and yaw, which is accurate enough for Newton steps."""
     ur, _, _, slope, second, along = strip_point(geometry, pose, u)
     _, rail_slope, rail_second = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
     return wheel_slope(pose, slope, along) - rail_slope, -second - rail_second

@@ -1,8 +1,8 @@
-"""Gap and rigid slip of the real surfaces over a contact plane: the wheel of revolution above the swept rail.
+"""Gap and rigid slip of the true surfaces over a contact plane: a wheel of revolution above a swept rail.
 
-A contact plane has the axes (1) x forward, (2) s to the left in the plane, (3) n from rail into wheel. Wheel and rail
-are cut by the lines along n through its points, without any expansion along x or s. A rail that changes along the track
-is higher than its section by `ContactGeometry.over`.
+A contact plane has the axes (1) x forward, (2) s to the left in the plane, (3) n from rail into wheel. Lines along n
+through its points are intersected with wheel and rail, without an expansion along x or s. A rail that changes along
+the track is higher than its section by `ContactGeometry.over`.
 """
 
 import math
@@ -16,7 +16,7 @@ from wrcore.contact.search.strip import AS_KERNELS, cubic_at
 from wrcore.kernels.jit import jit
 
 NO_RAIL = 1.0
-"""Gap where one of the two profiles has ended, m."""
+"""Gap beyond the end of one of the two profiles, m."""
 
 _TOLERANCE = 1e-12
 _ON_PROFILE = 1e-9
@@ -48,21 +48,22 @@ class Motion(NamedTuple):
 
 
 def contact_plane(x, y, z, angle):
-    """Contact plane through (x, y, z), m, at a contact angle (rad, about x)."""
+    """Return the `ContactPlane` through (x, y, z), m, with a contact angle (rad, about x)."""
     return ContactPlane(float(x), float(y), float(z), math.cos(angle), math.sin(angle))
 
 
 @jit(allocates=False)
 def rail_height(geometry, pose, plane, s, u):
-    """Height n (m) of the rail over a contact plane at s, and its profile coordinate there, from the guess ``u``; NaN
-    where the line along n does not meet the rail's profile."""
+    """Height n (m) of the rail over a contact plane at ``s``, and the profile coordinate of this point (m).
+
+    ``u`` is a guess of the profile coordinate. The height is NaN where the line along n misses the rail's profile."""
     side, sine = pose.side, pose.side * plane.sine
     origin = side * plane.y - geometry.rail_distance
     low, high = geometry.rail_start, geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
     u = min(max(u, low), high)
     for _ in range(_MOST_STEPS):
         f, slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, u)
-        # in the side's own direction outwards: side s = (u - origin) cos + (f - z) side sin
+        # positive outwards on either side: side s = (u - origin) cos + (f - z) side sin
         miss = (u - origin) * plane.cosine + (f - plane.z) * sine - side * s
         rate = plane.cosine + slope * sine
         if miss > 0.0:
@@ -73,7 +74,7 @@ def rail_height(geometry, pose, plane, s, u):
         new = u - step
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        if abs(new - u) < _TOLERANCE:  # past an end of the profile the bisection gets there with a miss left
+        if abs(new - u) < _TOLERANCE:  # beyond an end of the profile the bisection stops with a residual ``miss``
             height = -(u - origin) * sine + (f - plane.z) * plane.cosine
             return (height if abs(miss) < _ON_PROFILE else np.nan), u
         u = new
@@ -82,7 +83,7 @@ def rail_height(geometry, pose, plane, s, u):
 
 @jit(allocates=False)
 def wheel_height(geometry, pose, plane, x, s, n):
-    """Height n (m) of the wheel over a contact plane at (x, s), from a guess; NaN where it does not get there."""
+    """Height n (m) of the wheel over a contact plane at (x, s), from the guess ``n``; NaN beyond the profile's ends."""
     # relative to the wheelset's centre; the plane's axes are (1, 0, 0), (0, cos, sin), (0, -sin, cos)
     rx, ry = plane.x + x, plane.y + s * plane.cosine - pose.y
     rz = plane.z + s * plane.sine - pose.z
@@ -110,7 +111,7 @@ def _over(over, rail_start, rail_step, x, u):
 
 
 def _height_over(over, rail_start, rail_step, x, u):
-    """Cubic through four stations, linear across."""
+    """Interpolate the height of the rail over its section (m): cubic along the track, linear across."""
     at, across = (x - over[0, 0]) / (over[1, 0] - over[0, 0]), (u - rail_start) / rail_step
     i, j = min(max(int(at), 1), over.shape[0] - 3), min(max(int(across), 0), over.shape[1] - 3)
     f, g = min(max(at - i, -1.0), 2.0), min(max(across - j, 0.0), 1.0)
@@ -125,7 +126,7 @@ def _height_over(over, rail_start, rail_step, x, u):
 
 @overload(_over, inline="always", jit_options=AS_KERNELS)
 def _over_by_type(over, rail_start, rail_step, x, u):
-    """Nothing at all for rails that are the same everywhere."""
+    """Select the kernel of `_over`: for a rail with a constant section it returns 0."""
     if isinstance(over, types.BaseTuple):
         return lambda over, rail_start, rail_step, x, u: 0.0
     return _height_over
@@ -133,7 +134,8 @@ def _over_by_type(over, rail_start, rail_step, x, u):
 
 @jit(allocates=False, forceinline=True)
 def rail_over(geometry, x, u):
-    """How much higher than its section the rail is at x from the wheelset's cross-section, m."""
+    """Height of the rail over its section at ``x`` from the wheelset's cross-section and profile coordinate ``u``,
+    m."""
     return _over(geometry.over, geometry.rail_start, geometry.rail_step, x, u)
 
 
@@ -150,17 +152,18 @@ def _station_by_type(over, i):
 
 @jit(allocates=False, forceinline=True)
 def station_of(geometry, i):
-    """The i-th station of a rail that changes along the track, m."""
+    """Position of the i-th station of a rail that changes along the track, from the wheelset's cross-section, m."""
     return _station(geometry.over, i)
 
 
 @jit(allocates=False)
 def surface_gap(geometry, pose, plane, x, s, gap, height):
-    """Gap between wheel and rail over a contact plane, exactly as the surfaces are, at points ``x`` (nx,), ``s`` (ns,)
-    relative to its origin (m, increasing).
+    """Fill ``gap`` and ``height`` with the gap of the true surfaces of wheel and rail over a contact plane.
 
-    Writes, (nx, ns), the distance from rail to wheel along n (m; negative in overlap, `NO_RAIL` where a profile has
-    ended) and the wheel's height n over the plane (m; 0 where a profile has ended). A pose may be spatial or planar."""
+    The points ``x`` (nx,), ``s`` (ns,) are relative to the plane's origin (m, increasing). ``gap`` (nx, ns) is the
+    distance from rail to wheel along n (m), negative in overlap, `NO_RAIL` beyond the end of a profile. ``height``
+    (nx, ns) is the wheel's height n over the plane (m), 0 beyond the end of a profile. A pose may be spatial or
+    planar."""
     u = pose.side * plane.y - geometry.rail_distance + pose.side * plane.cosine * s[0]
     for j in range(s.size):
         rail, u = rail_height(geometry, pose, plane, s[j], u)
@@ -176,8 +179,10 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
 
 @jit
 def strip_planes(s, gap, height):
-    """Of each strip along x the wheel's least height (m), and the slope over s midway between wheel and rail there,
-    (ns,), from ``gap`` and ``height`` of `surface_gap`; 0 where a profile has ended."""
+    """Return for each strip along x the wheel's minimum height (m), and the slope of the mean surface over s.
+
+    The mean surface lies midway between wheel and rail. ``gap`` and ``height`` come from `surface_gap`. Both results
+    (ns,) are 0 beyond the end of a profile."""
     low, tilt = np.zeros(s.size), np.zeros(s.size)
     for j in range(s.size):
         here, middle = _lowest(gap, height, j)
@@ -195,7 +200,9 @@ def strip_planes(s, gap, height):
 
 @jit(allocates=False)
 def _lowest(gap, height, j):
-    """The wheel's least height in a strip, and that midway between wheel and rail there; NaN where a profile ended."""
+    """Minimum height of the wheel in a strip, and the height midway between wheel and rail at this point (m).
+
+    NaN beyond the end of a profile."""
     low = mid = np.nan
     for i in range(gap.shape[0]):
         if gap[i, j] < NO_RAIL and not low <= height[i, j]:
@@ -205,11 +212,11 @@ def _lowest(gap, height, j):
 
 @jit(allocates=False)
 def surface_slip(pose, plane, motion, x, s, low, tilt, wx, ws):
-    """Rigid slip of the wheel's own surface over the rail at rest, forward and (``ws``) to the left in the plane of
-    each strip along x, over the speed: fills ``wx``, ``ws`` (nx, ns); ``low``, ``tilt``: of `strip_planes`.
+    """Fill ``wx`` and ``ws`` (nx, ns) with the rigid slip of the wheel over the rail at rest, divided by the speed.
 
-    A strip of the wheel counts with its radius at its point nearest to the rail: away from it the undeformed wheel
-    moves more slowly along x, but the flattened one does not, as its surface passes over the same length."""
+    ``wx`` is forward, ``ws`` to the left in the plane of each strip along x. ``low`` and ``tilt`` come from
+    `strip_planes`. Each strip has the radius of its point nearest to the rail. Away from this point the undeformed
+    wheel moves more slowly along x; the flattened wheel does not, as its surface passes over the same length."""
     slowness = 1.0 / motion.speed
     for j in range(s.size):
         secant = 1.0 / math.sqrt(1.0 + tilt[j] * tilt[j])
@@ -226,7 +233,9 @@ def surface_slip(pose, plane, motion, x, s, low, tilt, wx, ws):
 
 @jit(allocates=False)
 def plane_slip(xi, eta, phi, x, s, wx, ws):
-    """Rigid slip of one set of creepages at the plane's origin: wx = xi - phi s, ws = eta + phi x, shapes (nx, ns)."""
+    """Fill ``wx`` and ``ws`` (nx, ns) with the rigid slip of the creepages xi, eta and phi (1/m) at the plane's origin.
+
+    wx = xi - phi s, ws = eta + phi x."""
     for i in range(x.size):
         for j in range(s.size):
             wx[i, j], ws[i, j] = xi - phi * s[j], eta + phi * x[i]
