@@ -1,1 +1,1 @@
-"""Pressure in a patch by strips."""
+"""Normal problem of a contact patch: pressure on strips."""

@@ -1,13 +1,14 @@
-"""The gap of a real wheel over a real rail in the frame of one patch, strip by strip, and its rigid slip.
+"""Gap and rigid slip of a measured wheel on a measured rail in the contact frame of one patch, strip by strip.
 
 The contact frame (x forward, s lateral, n normal from rail into wheel) has one contact angle per patch. At fixed s the
-wheel's height over x is a parabola about the extreme point of the wheel's strip there, the locus N_x = 0 that spatial
-detection has in closed form (:mod:`wrcore.contact.search.strip`):
+wheel's height over x is a parabola about the extreme point of the wheel's strip. This point, N_x = 0, is known in
+closed form (:mod:`wrcore.contact.search.strip`):
 
     g(x, s) = g0(s) + A(s) (x - x_c(s))^2,   A = kappa_x / (2 cos(delta_w - delta)),
     kappa_x = cos(alpha)/R (1 - q) + kappa_profile q,   q = sin^2 of the angle between the circle's tangent and x.
 
-Inside, s counts outwards (to the field side) on both wheels, so that a mirrored pose is solved by the same operations.
+In this module s is positive outwards (to the field side) on both wheels, so that a mirrored position is solved by the
+same operations.
 """
 
 import math
@@ -48,54 +49,56 @@ from wrcore.contact.search.strip import (
 from wrcore.kernels.jit import FUSED, jit
 
 JOINED_ANGLE = 0.5
-"""Neighbouring overlaps whose planes differ by less (rad) are one patch with one contact angle."""
+"""Difference of contact angles (rad) below which neighbouring overlaps are one patch with one contact angle."""
 
 JOINED = 8e-3
-"""Overlaps that are closer than this across share a patch, as in CONTACT, m."""
+"""Lateral distance (m) below which overlaps are one patch, as in CONTACT."""
 
 NODES = 48
-"""Nodes over each overlap at which the gap is looked at."""
+"""Number of nodes over each overlap at which the gap is evaluated."""
 
 _REACH = 1.4
-"""Half of the range that the mean contact angle is over, over the half width that the overlap's moments give."""
+"""Half of the range over which the contact angle is averaged, over the overlap's half width from its moments."""
 
 # Rows of the nodes over the overlaps.
 S, NODE_GAP, NODE_SHAPE, NODE_CREST, NODE_SQUARE, NODE_SHARE = range(6)
 NODE_ROWS = 6
 
-# Rows of the strip gap: what `strip_gap` fills.
+# Rows of the strip gap, which `strip_gap` returns.
 GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, TILT, U, UR = range(10)
 GAP_ROWS = 10
 
 _STEPS_TO_EDGE = 5
-"""Quarters of a scan step in which an overlap's end is sought from the scan's point next to it."""
+"""Number of steps, each a quarter of a scan step, in the search for an overlap's end from the scan's point next to
+it."""
 
 _ANGLE_NODES = 32
-"""Nodes over half of each overlap for the mean contact angle, over its half width; as many again where it goes on."""
+"""Nodes over half of each overlap for the mean contact angle; the same number again where the overlap is wider."""
 
 _PROBE = 2e-5
-"""Step in u for the rates of A and x_c, m."""
+"""Step in u for the derivatives of A and x_c by differences, m."""
 
 
 class Frame(NamedTuple):
-    """Contact frame of a patch, for kernels; lateral coordinates count outwards."""
+    """Contact frame of a patch, for kernels; lateral coordinates are positive outwards."""
 
     cosine: float
     sine: float
-    """Of the contact angle, positive where the rail rises outwards."""
+    """Sine of the contact angle, positive where the rail rises outwards."""
     x: float
-    """Origin, m: from the wheelset's cross-section."""
+    """Longitudinal position of the origin from the wheelset's cross-section, m."""
     ur: float
-    """Origin: rail coordinate."""
+    """Rail coordinate of the origin, m."""
     z: float
     u: float
-    """Wheel coordinate of the origin."""
+    """Wheel coordinate of the origin, m; ``z`` is the origin's height, m."""
 
 
 @jit(allocates=False)
 def group_end(geometry, patches, count, first):
-    """End of the run of overlaps, from ``first``, that are one patch; where a rail may have several heads they are not
-    if they lie far apart."""
+    """Index after the last of the overlaps from ``first`` on that are one patch.
+
+    On a rail that may have several heads, distant overlaps are separate patches (`JOINED`)."""
     last = first + 1
     while last < count and abs(patches[last, ANGLE] - patches[last - 1, ANGLE]) < JOINED_ANGLE:
         if changes_along(geometry) and abs(patches[last, Y] - patches[last - 1, Y]) > JOINED:
@@ -106,10 +109,11 @@ def group_end(geometry, patches, count, first):
 
 @jit(allocates=False)
 def frame_of_overlaps(geometry, pose, patches, first, last):
-    """Contact frame of the overlaps from ``first`` to before ``last``, at the lateral mean of g^2 over all of them.
+    """Contact frame of the overlaps ``first`` to ``last`` - 1, at their mean position weighted with g^2.
 
-    Its angle is the mean of that of the surfaces over g^2.5, which is g^2 over the overlap's area. Where a patch has
-    two lobes the angle at the mean place is off by up to 18 mrad, and spin and lateral force with it."""
+    Its angle is the mean angle of the surfaces weighted with g^2.5, which is g^2 integrated over the overlap's area.
+    With two sub-patches the angle at the mean position would have an error of up to 18 mrad, which would cause errors
+    of spin and lateral force."""
     weight = mean = 0.0
     for k in range(first, last):
         row = patches[k]
@@ -129,7 +133,9 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
 
 @jit(allocates=False)
 def frame_of_rows(patches, first, last):
-    """As `frame_of_overlaps`, from the rows alone: means over g^2.5 of what they have at their deepest points."""
+    """Contact frame of the overlaps ``first`` to ``last`` - 1 from their rows: means weighted with g^2.5.
+
+    `frame_of_overlaps` is more accurate, and evaluates the surfaces."""
     if last == first + 1:
         one = patches[first]
         return Frame(one[COSINE], one[SINE], one[X], one[U_RAIL], one[Z], one[U_WHEEL])
@@ -145,7 +151,7 @@ def frame_of_rows(patches, first, last):
 
 @jit(allocates=False)
 def _mean_angle(geometry, pose, patches, first, last, otherwise):
-    """Mean of the angle of wheel and rail over the overlaps, rad."""
+    """Mean angle of wheel and rail over the overlaps, rad; ``otherwise`` if no node is in overlap."""
     weight = mean = 0.0
     for k in range(first, last):
         row = patches[k]
@@ -158,7 +164,7 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
                 ur, z, _, slope, _, along = strip_point(geometry, pose, u)
                 f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
                 depth = f - z
-                off = not row[OUTSIDE] < u < row[BEYOND] or not on_rail(geometry, ur)  # past its end a curve goes on
+                off = not row[OUTSIDE] < u < row[BEYOND] or not on_rail(geometry, ur)  # curves are extrapolated
                 if off or (i >= _ANGLE_NODES and depth <= 0.0):
                     break
                 if depth > 0.0:
@@ -172,7 +178,8 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _shape_at(geometry, pose, tangent, u, ur, radius, slope, along, m):
-    """A (1/m) and the x of the least gap (m, from the wheelset's cross-section) of the wheel's strip at u, over ur."""
+    """Curvature A (1/m) and x of the minimum gap (m, from the wheelset's cross-section) of the wheel's strip at u, over
+    ur."""
     rise = (m - tangent) / (1.0 + m * tangent)
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
     kappa = cosine / radius
@@ -188,11 +195,11 @@ def _shape_at(geometry, pose, tangent, u, ur, radius, slope, along, m):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_gap(geometry, pose, frame, s, u, ur):
-    """Gap of the strip at ``s`` (m, outwards) from guesses of its wheel and rail coordinates (m).
+    """Gap of the strip at ``s`` (m, outwards) from the guesses ``u`` and ``ur`` of its wheel and rail coordinates (m).
 
-    Returns g0 (m) along the normal of the strip's own plane and its slope over s, A (1/m) likewise and x_c (m), the
-    slopes of both over s, the height (m) of the wheel's extreme point along n, the slope over s of the strip's own
-    plane (midway between wheel and rail), u and ur for the next strip."""
+    A strip's plane lies midway between wheel and rail. Returns g0 (m) along the normal of the strip's plane and its
+    slope over s; A (1/m), also along this normal, and x_c (m); the slopes of both over s; the height (m) of the wheel's
+    extreme point along n; the slope over s of the strip's plane; u and ur as guesses for the next strip."""
     tangent = frame.sine / frame.cosine
     here = normal = rise = radius = slope = second = along = height = m = 0.0
     rate = 1.0
@@ -235,8 +242,10 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
 @jit(allocates=False)
 def _edge_of(geometry, pose, outside, step):
-    """u of an overlap's end, m, from a point ``outside`` next to it in steps towards it; that point where none is seen:
-    an overlap may hide between two, and a row have air between several."""
+    """Wheel coordinate of an overlap's end (m), by steps from a point ``outside`` next to it.
+
+    Returns ``outside`` if no step is in overlap: an overlap can lie between two steps, and a row can contain several
+    overlaps with gaps between them."""
     u = outside
     for _ in range(_STEPS_TO_EDGE):
         u += step
@@ -247,9 +256,11 @@ def _edge_of(geometry, pose, outside, step):
 
 @jit(allocates=False)
 def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
-    """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m), A (1/m) and x of the least gap (m) of
-    ``nodes`` (NODE_ROWS, n), and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u.
-    Returns the number of stretches."""
+    """Evaluate the gap at nodes over the overlaps of a patch, from the inside outwards.
+
+    Fills s (m), gap (m), A (1/m) and x of the minimum gap (m) of ``nodes`` (NODE_ROWS, n), and ``ends`` with the number
+    of nodes up to the end of each overlap. Nodes of one overlap have equal steps in u. Returns the number of
+    overlaps."""
     count = 0
     for k in range(first, last):
         low = _edge_of(geometry, pose, patches[k, OUTSIDE], SCAN_STEP / 4.0)
@@ -264,8 +275,9 @@ def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends)
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _fill_node(geometry, pose, frame, u, nodes, k):
-    """Node k: s, gap, A and crest of the wheel's strip at u, from the vertical gap (right to second order of the
-    overlap)."""
+    """Fill s, gap, A and x of the minimum gap at node k, for the wheel's strip at ``u``.
+
+    They come from the vertical gap, with errors beyond second order in the overlap."""
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     gap, df = gap_at(geometry, pose, u)
     nodes[S, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
@@ -285,7 +297,7 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
 
 @jit(allocates=False, fastmath=FUSED)
 def unroll(centre, width, tilt, place, own):
-    """Fill the places and widths (m) that strips have along their own planes, where they carry and roll."""
+    """Fill ``place`` and ``own`` with positions and widths (m) of the strips, measured over their inclined planes."""
     for i in range(len(centre)):
         own[i] = width[i] * math.sqrt(1.0 + tilt[i] * tilt[i])
         place[i] = centre[0]
@@ -295,14 +307,15 @@ def unroll(centre, width, tilt, place, own):
 
 @jit(allocates=False, forceinline=True)
 def lean_of(geometry, pose, frame):
-    """`lean_at` of a patch."""
+    """Cosine and sine of the angle of a patch about the axle, see `wrcore.contact.search.strip.lean_at`."""
     return lean_at(geometry, frame.ur, with_rail_along(geometry, LIFT, frame.ur, 1.0, frame.z) - pose.z)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def material_point(geometry, pose, frame, s, x, height, tilt):
-    """Point of a left wheel's undeformed surface on a strip, from the wheelset's centre, and its own plane's angle, in
-    axes that lean as the patch does."""
+    """Point of a left wheel's undeformed surface on a strip, and the angle of the strip's plane.
+
+    Returns x, y, z from the wheelset's centre (m), in axes rotated by `lean_of`, and cosine and sine of the angle."""
     cosine = 1.0 / math.sqrt(1.0 + tilt * tilt)
     across = frame.ur + geometry.rail_distance + s * frame.cosine - height * frame.sine
     z = frame.z + s * frame.sine + height * frame.cosine
@@ -313,14 +326,13 @@ def material_point(geometry, pose, frame, s, x, height, tilt):
 
 @jit(allocates=False, fastmath=FUSED)
 def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, slip):
-    """Rigid slip of a left wheel's over its rail's surface at the strips' middles, from the wheelset's motion.
+    """Fill ``slip`` (4, n) with the rigid slip of a left wheel over its rail at the middles of the strips.
 
-    ``velocity``: vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), rolling speed V > 0 (m/s), in axes that
-    lean as the patch does. Strips (n,):
-    s, X, height of the wheel's extreme point along n (m), slope of their own planes over s. Fills ``slip`` (4, n):
-    velocity of the wheel's material point relative to the rail's over V along x, its slope over x (1/m), and both
-    across in the strip's own plane. That point lies on the undeformed surface, as in CONTACT: equal bodies shorten
-    alike under pressure."""
+    ``velocity``: vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), rolling speed V > 0 (m/s), in axes
+    rotated by `lean_of`. Strips (n,): s, X, height of the wheel's extreme point along n (m), slope of their planes over
+    s. Rows of ``slip``: velocity of the wheel's material point relative to that of the rail, over V, along x; its slope
+    over x (1/m); then both across, in the strip's plane. The point lies on the undeformed surface, as in CONTACT: equal
+    bodies shorten equally under pressure."""
     vx, vy, vz, wx, wy, wz, speed = velocity
     for i in range(len(centre)):
         px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
@@ -330,12 +342,12 @@ def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, sl
 
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, force, share, pressure, friction):
-    """Add ``share`` of the wrenches of pressure and friction on the strips, about the wheelset's centre, in axes that
-    lean as the patch does.
+    """Add ``share`` times the wrenches of the strips to ``pressure`` and ``friction``, about the wheelset's centre.
 
-    The load (along n, N) acts along the normal of each strip's own plane, as the gap along n has it: n - tilt s. For
-    friction this is `rigid_slip`, transposed: it takes from the wheelset what it does on the slip. ``force``, (3, n):
-    along x and across, N, and the moment of the latter about the strip's middle, N m."""
+    Axes are rotated by `lean_of`. The load (along n, N) acts along the normal of each strip's plane, n - tilt s, in
+    agreement with the gap along n. The wrench of friction is the transpose of `rigid_slip`, so that its power equals
+    that of the slip. ``force`` (3, n): forces along x and across, N, and the moment of the second about the strip's
+    middle, N m."""
     for i in range(len(centre)):
         px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         fx, fs, turn = share * force[0, i], share * force[1, i], share * force[2, i]
@@ -348,7 +360,7 @@ def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, fo
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_force(px, py, pz, fx, fy, fz, wrench):
-    """Add a force at a point to a wrench."""
+    """Add a force (N) at a point (m) to a ``wrench`` of force (N) and moment about the origin (N m)."""
     wrench[0] += fx
     wrench[1] += fy
     wrench[2] += fz

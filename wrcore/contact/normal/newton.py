@@ -1,4 +1,4 @@
-"""Newton's iteration for strips in windows whose ends are the tips of contact."""
+"""Newton's iteration for the pressure on strips and for the tips of contact, which are the ends of windows."""
 
 import math
 
@@ -9,7 +9,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 @jit(allocates=False, fastmath=FUSED)
 def _factorise_panel(matrix, n, begin, end):
-    """Eliminate below the diagonal in columns ``begin`` to before ``end``, rows exchanged whole. False: singular."""
+    """Eliminate below the diagonal in columns ``begin`` to ``end`` - 1, with exchange of whole rows; False if
+    singular."""
     for k in range(begin, end):
         pivot, largest = k, abs(matrix[k, k])
         for i in range(k + 1, n):
@@ -38,8 +39,9 @@ def _subtract_four(row, one, two, three, four, a, b, c, d):
 
 @jit(allocates=False, fastmath=FUSED)
 def solve_linear(matrix, n):
-    """Gaussian elimination with partial pivoting, four columns at a time; the solution ends up in column n. False if
-    the matrix is singular."""
+    """Solve a linear system (n, n + 1), with its right side in column n, in place; False if the matrix is singular.
+
+    Gaussian elimination with partial pivoting, four columns at a time. The solution replaces column n."""
     for begin in range(0, n, 4):
         end = min(begin + 4, n)
         if not _factorise_panel(matrix, n, begin, end):
@@ -78,12 +80,12 @@ def _limited(value, low, high):
 
 @jit(allocates=False, fastmath=FUSED)
 def _tips_too_fast(work, windows, kinds, bold):
-    """Steps of the tips: at most a strip's width, and half of the step before where one turns back.
+    """Limit the steps of the tips to a strip's width, and to half of the last step where the direction reverses.
 
-    A tip that goes on turning back sits where a kink of the gap leaves no zero: if ``bold`` it then follows the sign of
-    the tip's condition alone, outwards while c does not fall fast enough.
+    A tip whose direction reverses again and again lies at a kink of the gap, where the tip's condition has no zero. If
+    ``bold``, its step then follows only the sign of the condition: outwards while c does not decrease fast enough.
 
-    Returns whether one was cut: the strips' steps then belong to another window and are solved for again."""
+    Returns whether a step was limited. The steps of the strips must then be solved again."""
     tips, cut = kinds * work.start[windows], False
     n = tips + 2 * windows
     for k in range(windows):
@@ -104,19 +106,21 @@ def _tips_too_fast(work, windows, kinds, bold):
 CONVERGED, STARVED, CROSSED, LOST = 0, 1, 2, 3
 
 _RESTLESS = 6
-"""Steps after which a tip that turns back is taken for trapped."""
+"""Number of steps after which a tip that reverses its direction is treated as trapped at a kink."""
 
 _PATIENCE = 3
-"""Steps in which a strip would lose its pressure, or two windows overlap, before Newton's iteration gives up."""
+"""Number of successive steps with a strip losing its pressure, or two windows overlapping, after which Newton's
+iteration stops."""
 
 
 FAINT, NEGLIGIBLE = 2e-3, 1e-4
-"""A strip goes without pressure below this share of its window's largest c, a window below that of the patch's."""
+"""Limits of c below which there is no pressure: of a strip over the maximum c of its window, and of the maximum of a
+window over that of the patch."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def top_squares(work, windows):
-    """Fill ``work.tops``; the largest c of all windows."""
+    """Fill ``work.tops`` with the maximum c of each window; return the maximum of all windows (m^2)."""
     largest = 0.0
     for k in range(windows):
         work.tops[k] = 0.0
@@ -128,8 +132,10 @@ def top_squares(work, windows):
 
 @jit(allocates=False, fastmath=FUSED)
 def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tolerance):
-    """Newton's iteration from the strips in ``work``, with limits strip by strip (``bold``: see `_tips_too_fast`).
-    Returns CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST."""
+    """Solve Galerkin's conditions by Newton's iteration from the strips in ``work``, with limited steps of each strip.
+
+    ``most`` is the maximum number of steps; for ``bold`` see `_tips_too_fast`. Returns CONVERGED, STARVED (strips lost
+    their pressure), CROSSED (windows overlap) or LOST (no convergence)."""
     strips = work.start[windows]
     starved_for = crossed_for = 0
     for k in range(windows):
@@ -193,7 +199,9 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
 
 @jit(allocates=False, fastmath=FUSED)
 def solve_shares(values, work, windows, kinds):
-    """Q of all strips from the first of Galerkin's conditions at fixed half lengths: a start where Hertz gives none."""
+    """Update Q of all strips from the first of Galerkin's conditions at fixed half lengths.
+
+    This is a start of the iteration where Hertz's theory has none."""
     strips = work.start[windows]
     n = assemble(values, work, windows, kinds)
     matrix = work.matrix

@@ -1,12 +1,12 @@
-"""Exact non-Hertzian normal contact of a wheel on a rail: Galerkin strips in windows that end at the tips of contact.
+"""Non-Hertzian normal contact of a wheel on a rail: Galerkin strips in windows that end at the tips of contact.
 
 Across the patch, strips of width w carry a pressure that is semi-elliptic along x,
 
     p = p0 sqrt(1 - ((x - X)/a)^2),   p0 = pi E* Q a,
 
-with unknown Q, half length a and (with yaw) middle X. Galerkin's conditions make the loaded gap vanish in the mean and
-in its second and first moment along the strip; the tips of a window lie where a^2, linear there, vanishes. All strips
-of a patch, whichever window they belong to, act on each other through the half-space
+with unknown Q, half length a and (with yaw) middle X. Galerkin's conditions set the mean, the second and the first
+moment of the loaded gap along the strip to 0. A window is a run of strips in contact, one per sub-patch. Its tips lie
+where a^2, linear there, is 0. All strips of all windows of a patch act on each other through the half-space
 (:mod:`wrcore.contact.normal.influence`).
 
 References
@@ -49,40 +49,42 @@ from wrcore.contact.search.strip import changes_along
 from wrcore.kernels.jit import FUSED, jit
 
 _ROUNDS = 5
-"""Sets of windows that are tried for one patch."""
+"""Maximum number of sets of windows that are tried for one patch."""
 
 _BORN, _HARDLY = 1e-3, 1e-2
-"""Shares of the deepest penetration by which loaded surfaces interpenetrate where a lobe is born. The second is for
-lobes that barely touch: they are born with the first and starve, again and again."""
+"""Remaining overlap of the loaded surfaces, over the maximum penetration, at which a window is added. The second is for
+sub-patches that barely touch: with the first they would be added and removed in alternate iterations."""
 
 _OVERLOOKED = 0.02
-"""Largest share of the deepest penetration that strips may overlook: smooth profiles leave up to 0.013, under 160 kN;
-N is off by 1 to 29 % of waves that leave more, and fixed strips stand in."""
+"""Maximum deviation of the gap between strips, over the maximum penetration. Smooth profiles have up to 0.013, under
+160 kN. For waves with larger deviations N has errors of 1 to 29 %, and fixed strips are used instead."""
 
 _OTHER_NUMBERS = 0, 4, -1, 2
-"""Strips by which a window's number differs in turn, where no solution was found."""
+"""Changes of the number of strips of a window, tried in this order while no solution is found."""
 
 _IN_VAIN = -1.0
-"""First number of a memory where no windows were found."""
+"""First number of a memory if no windows were found."""
 
 _REACH = 0.5
-"""A window's tips may lie this share of its width beyond all overlaps for a solution to start from."""
+"""Maximum distance of a window's tips beyond all overlaps, over its width, for the last solution to be a start."""
 
 _NEARBY, _AROUND = 1.5e-5, 1e-4
-"""Windows are sought anew where the wheel lies so far, m, from where none were found; the second where they are sought
-from the first guess alone."""
+"""Distance of the wheel (m) from the position of a failed search for windows from which the search is repeated. The
+second holds where the search starts from the first guess only."""
 
 _TURNED, _SHIFTED = 0.05, 1e-3
-"""Or where the frame has turned (rad) or moved (m) by so much: places in it are others then."""
+"""Rotation (rad) and displacement (m) of the frame from which the search is repeated too: positions in the frame have
+then changed."""
 
 _STEPS = 24
-"""Of Newton's iteration for one set of windows; see also `strips.STEPS`."""
+"""Maximum number of Newton steps for one set of windows; see also `strips.STEPS`."""
 
 _TOLERANCE = 1e-4
-"""Newton's iteration ends when no step is longer, as a share of the unknown."""
+"""Newton's iteration has converged when all steps are below this fraction of the unknown."""
 
 TIP_SHARE, TIP_GROWTH = 0.13, 0.04
-"""By which a window's last strips are too long for their area: the share, and its growth with ln(a/width) there."""
+"""Relative excess of the half length of a window's last strips over that with their area: at a = width, and its growth
+with ln(a/width)."""
 
 # Rows of the strip array, and of the sums over a patch.
 CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WINDOW, WHEEL_HEIGHT, STRIP_TILT, STRIP_LOAD, OWN_PLACE, OWN_WIDTH = range(11)
@@ -93,16 +95,16 @@ SUMS = 10
 
 @jit(allocates=False)
 def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, memory, work):
-    """Normal problem of the overlaps from ``first`` to before ``last`` of ``patches`` (as `find_patches` fills it, by
-    moments), which count as one patch. Fills ``work``; returns the number of windows (0 where no solution was found)
-    and their `Frame`.
+    """Solve the normal problem of one patch, which consists of the overlaps ``first`` to ``last`` - 1 of ``patches``.
 
-    ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
-    if it fits (its first number 0: none); filled with this one. It leaves the result the same to the square of the
-    iteration's tolerance where one set of windows fits; where several do, as between lobes of worn wheels, it keeps its
-    own: N then differs by up to 2 % from that without it, and steps less. Where none were found none are sought nearby:
-    fixed strips go on.
-    """
+    Fills ``work``; returns the number of windows (0 if there is no solution) and their `Frame`. `find_patches` fills
+    ``patches`` by moments. ``resolution`` is the number of strips of a window; ``values`` is the `influence_table`.
+
+    ``memory`` (MEMORY,) holds the last solution (first number 0: none), from which the iteration starts if it fits; the
+    new solution replaces it. If only one set of windows fits, the memory changes the result by the square of the
+    iteration's tolerance. If several sets fit, as between sub-patches of worn wheels, the previous set is kept. N then
+    differs by up to 2 % from the result without memory, and has smaller jumps. Near a position without windows the
+    search is not repeated; fixed strips are used."""
     work.more[FIXED] = 0.0
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
@@ -127,7 +129,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 if overlooked(work, windows, stretches) <= _OVERLOOKED:
                     _remember(frame, work, windows, guessed, usual - resolution, memory)
                     return windows, frame
-                left = 0 if windows == guessed else work.left[1]  # others may overlook less
+                left = 0 if windows == guessed else work.left[1]  # other windows may have smaller deviations
     if memory[0] > 0.0:
         windows = guess_windows(work, stretches, resolution)
     memory[0], work.left[0] = 0.0, left
@@ -147,7 +149,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 break
         windows = work.guessed[0] = 0
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
-    if work.more[WIDENED] == 1.0:  # not of the second of two solutions
+    if work.more[WIDENED] == 1.0:  # not for the second of two blended solutions
         memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
         memory[KEPT], (memory[WHEEL_POSITION], memory[WHEEL_POSITION + 1]) = 0.0, _wheel_position(geometry, pose)
         memory[WHEEL_POSITION + 2] = math.atan2(frame.sine, frame.cosine)
@@ -157,7 +159,9 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
 
 @jit(allocates=False)
 def _on_overlaps(patches, first, last, work, windows, memory):
-    """The number of windows, 0 if a strip lies off the overlaps: on steep flanks places of a frame are ambiguous."""
+    """Return the number of windows, or 0 if a strip lies outside the overlaps.
+
+    This happens on steep flanks, where positions in a frame are ambiguous."""
     for i in range(work.start[windows]):
         if not patches[first, OUTSIDE] < work.gap[i, U] < patches[last - 1, BEYOND]:
             memory[KEPT] = 0.0
@@ -167,15 +171,15 @@ def _on_overlaps(patches, first, last, work, windows, memory):
 
 @jit(allocates=False)
 def _wheel_position(geometry, pose):
-    """y, z (m) of the wheel on the rail: where the nominal radius ends below its axle."""
+    """Position y, z (m) of the wheel on the rail: the point at the nominal radius below its axle."""
     out, down = geometry.half_distance, geometry.rolling_radius
     return pose.y + out * pose.ey + down * pose.y_down, pose.z + out * pose.ez + down * pose.z_down
 
 
 @jit(allocates=False)
 def _near(geometry, pose, frame, memory, reach):
-    """Whether the wheel lies within the ``reach`` (m) of where windows were sought in vain, and the frame is the same
-    but for little."""
+    """Whether the wheel is within ``reach`` (m) of the position of a failed search for windows, with nearly the same
+    frame."""
     y, z = _wheel_position(geometry, pose)
     near = memory[0] < 0.0 and abs(y - memory[WHEEL_POSITION]) < reach and abs(z - memory[WHEEL_POSITION + 1]) < reach
     turned = abs(math.atan2(frame.sine, frame.cosine) - memory[WHEEL_POSITION + 2])
@@ -184,9 +188,10 @@ def _near(geometry, pose, frame, memory, reach):
 
 @jit(allocates=False)
 def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds, born):
-    """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be;
-    ``born``: see `newborn`. Returns the number of windows, 0 where no solution was found, -1 where it wants more than
-    there may be or strips overlook too much."""
+    """Solve without memory: first from the guess, if there is one, then from fixed strips, with repairs of the windows.
+
+    ``born`` is the argument ``least`` of `newborn`. Returns the number of windows; 0 if there is no solution; -1 if the
+    solution needs more windows than allowed or the gap between strips deviates too much (`overlooked`)."""
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if work.left[0] <= 0:
@@ -220,7 +225,7 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
 
 @jit(allocates=False)
 def _remember(frame, work, windows, guessed, extra, memory):
-    """Note what a warm start wants to know of the solution."""
+    """Write the solution to ``memory``, for a warm start."""
     memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = windows, frame.x, frame.ur, frame.z, guessed
     memory[EXTRA] = extra
     for k in range(windows):
@@ -233,8 +238,11 @@ def _remember(frame, work, windows, guessed, extra, memory):
 
 @jit(allocates=False, fastmath=FUSED)
 def _resume(frame, memory, work, guessed, stretches, resolution):
-    """Move the last solution to the new frame if the first guess was of as many windows as this one, and its own lie
-    among the overlaps: to the guess's strips if they are as many, else if they want as many strips as they had."""
+    """Transfer the last solution to the new frame as the start of an iteration; return whether it fits.
+
+    It fits if the number of guessed windows is unchanged and the windows of the solution lie near the overlaps. If
+    there are as many windows as guessed, they get the strips of the guess. Else their numbers of strips must be
+    unchanged."""
     windows = int(memory[0])
     if windows <= 0 or guessed == 0 or memory[GUESSED] != guessed:
         return False
@@ -269,7 +277,7 @@ def _resume(frame, memory, work, guessed, stretches, resolution):
 
 @jit(allocates=False)
 def _outermost(work, stretches):
-    """Ends of what was looked over, m."""
+    """Minimum and maximum s of the nodes over the overlaps, m."""
     low, high, first = math.inf, -math.inf, 0
     for stretch in range(stretches):
         end = work.ends[stretch]
@@ -279,7 +287,8 @@ def _outermost(work, stretches):
 
 @jit(allocates=False)
 def _tip_of(strips, end, step):
-    """Zero of the parabola through a^2 of a window's last three strips, m inwards from the window's end."""
+    """Tip of a window, where the parabola through a^2 of its last three strips is 0, m inwards from the window's
+    end."""
     length, width = strips[HALF_LENGTH], strips[WIDTH]
     t1 = 0.5 * width[end]
     t2 = t1 + 0.5 * (width[end] + width[end + step])
@@ -297,8 +306,10 @@ def _tip_of(strips, end, step):
 
 @jit(allocates=False)
 def _largest_pressure(strips, best):
-    """Greatest pressure, Pa: from the ``best`` strip half of the way to the top of a parabola over it and its
-    neighbours, which p0^2 is for an ellipse: pressures may have a kink."""
+    """Maximum pressure, Pa, between that of the ``best`` strip and the top of a parabola through p0^2.
+
+    For an ellipse p0^2 is a parabola over s. Pressures may have a kink, so that p0^2 is the mean of that of the strip
+    and of the top of the parabola over it and its neighbours."""
     place, square = strips[CENTRE], strips[PEAK, best] ** 2
     before, after = place[best] - place[best - 1], place[best + 1] - place[best]
     fall, rise = (square - strips[PEAK, best - 1] ** 2) / before, (strips[PEAK, best + 1] ** 2 - square) / after
@@ -309,9 +320,11 @@ def _largest_pressure(strips, best):
 
 @jit(allocates=False, fastmath=FUSED)
 def publish(modulus, work, windows, strips, sums):
-    """Fill ``strips`` (STRIP_ROWS, MAX_STRIPS), by increasing s, and ``sums`` over them: normal force, largest
-    pressure, means over the pressure of x, s, x^2, s^2, extents. ``modulus`` is E* (Pa). Returns the number of strips.
-    """
+    """Write the result to ``strips`` (STRIP_ROWS, MAX_STRIPS), by increasing s, and ``sums``; return the number of
+    strips.
+
+    ``sums`` are normal force (N), maximum pressure (Pa), means of x, s, x^2, s^2 weighted with the pressure, and
+    extents (m). ``modulus`` is E* (Pa)."""
     count, stiffness = work.start[windows], math.pi * modulus
     for q in range(SUMS):
         sums[q] = 0.0
@@ -343,10 +356,10 @@ def publish(modulus, work, windows, strips, sums):
 
 
 def even_length(half_length, width, window):
-    """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
+    """Half lengths (m) of rectangles that have the width of the strips and the area of the patch, shape (strips,).
 
-    Galerkin's strips at the tips of a window are too long, by a share that grows with length over width: fitted to
-    the area of Hertz's ellipses with a/b from 0.25 to 9 and 8 to 32 strips (within 0.3 %)."""
+    Galerkin's strips at the tips of a window are too long. Their relative excess grows with length over width. It is
+    fitted to the area of Hertz's ellipses with a/b from 0.25 to 9 and 8 to 32 strips (within 0.3 %)."""
     even, edge = half_length.copy(), np.diff(window, prepend=-1, append=-1) != 0
     at = edge[1:] | edge[:-1]
     even[at] *= 1.0 - TIP_SHARE - TIP_GROWTH * np.log(even[at] / width[at])

@@ -1,4 +1,4 @@
-"""Galerkin strips: residual and Jacobian of the normal problem."""
+"""Residual and Jacobian of the normal problem on Galerkin strips."""
 
 import math
 from typing import NamedTuple
@@ -29,52 +29,56 @@ from wrcore.kernels.jit import FUSED, jit
 MAX_STRIPS = 64
 MAX_WINDOWS = 4
 MAX_RUNS = 16
-"""Runs of strips in contact, as many as 32 fixed strips may have: lobes may be more than windows."""
+"""Maximum number of runs of strips in contact, that of 32 fixed strips; sub-patches may outnumber the windows."""
 
 MAX_UNKNOWNS = 3 * MAX_STRIPS + 2 * MAX_WINDOWS
 
 POINTS = np.cos((np.arange(4) + 0.5) * math.pi / 4.0)
-"""Gauss-Chebyshev points of a strip over its half length; without yaw the first two do."""
+"""Gauss-Chebyshev points of a strip over its half length; without yaw, by symmetry, the first two are sufficient."""
 
 COMPENSATION = 0.0125
-"""Share of the second difference of the gap over the strips that offsets pressures constant across each strip: N of 8
-to 16 strips then errs least, from round to slender patches (without it by +0.25 % with 8 strips on the tread)."""
+"""Fraction of the second difference of the gap over the strips that is added to the gap. It offsets the error of a
+pressure that is constant across each strip. With this value N has the smallest error with 8 to 16 strips, from round to
+slender patches (without it +0.25 % with 8 strips on the tread)."""
 
 SMOOTHING = 0.006
-"""Weight that holds down third differences of c along slender patches."""
+"""Weight of the third differences of c in the conditions, which keeps c smooth in slender patches."""
 
 BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
-"""What the second of Galerkin's conditions makes of a parabola t^2."""
+"""Value of the second of Galerkin's conditions for a parabola t^2."""
 
 
 MEMORY = 9 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
-"""Numbers that a warm start wants of a solution: windows (0: none; below: none were found), x, ur, z of its frame's
-origin; ends in strips and tips of its windows; windows of the first guess, and strips more than usual; y, z of the
-wheel and angle of the frame; Q, c and X of its strips. Where no windows were found: those of fixed strips, their number
-in place of the strips more, and the load in place of Q."""
+"""Length of the memory of a solution for a warm start.
+
+It holds the number of windows (0: no solution; < 0: no windows were found), x, ur, z of the frame's origin; for each
+window the end of its strips and both tips; the number of guessed windows, and the change of the usual number of strips;
+y, z of the wheel and angle of the frame; Q, c and X of each strip. If no windows were found, it holds the windows of
+fixed strips, with their number in place of the change, and the load in place of Q."""
 
 TIPS_FROM = 4
 GUESSED = TIPS_FROM + 3 * MAX_WINDOWS
 EXTRA = KEPT = GUESSED + 1
 WHEEL_POSITION = EXTRA + 1
 STRIPS_FROM = WHEEL_POSITION + 3
-"""Where a memory holds what."""
+"""First indices of the parts of a memory: tips, guessed windows, change of the number of strips (or number of windows
+of fixed strips), wheel position, strips."""
 
 
 STEPS = 250
-"""Of Newton's iteration after which a patch gets no further set of windows, but fixed strips: 99 of 100 that find a
-solution take at most 30 to 50 in all, on a flange under 230 kN one took 231; those that find none would take up to
-450."""
+"""Number of Newton steps of a patch after which fixed strips replace further sets of windows. Of 100 patches with a
+solution, 99 take at most 30 to 50 steps in all; one on a flange under 230 kN took 231. Patches without a solution
+would take up to 450."""
 
 WIDENED, WEIGHT, GUESS, FIXED = range(4)
-"""Places of a workspace's ``more``; the last is not 0 where strips are fixed as no tips were found."""
+"""Indices of `NormalWork.more`."""
 
 
 class NormalWork(NamedTuple):
-    """Arrays that a solution works in; lateral coordinates count outwards, strips by increasing s."""
+    """Work arrays of one solution; lateral coordinates are positive outwards, strips are sorted by increasing s."""
 
     nodes: np.ndarray
-    """(NODE_ROWS, n): s, gap, A and first guesses of c and Q where the overlaps are looked at."""
+    """(NODE_ROWS, n): s, gap, A, x of the minimum gap and first guesses of c and Q at nodes over the overlaps."""
     ends: np.ndarray
     """Number of nodes up to the end of each overlap."""
     low: np.ndarray
@@ -83,13 +87,13 @@ class NormalWork(NamedTuple):
     start: np.ndarray
     """(MAX_WINDOWS + 1,) first strip of each window."""
     guessed: np.ndarray
-    """(MAX_WINDOWS + 1,): number of windows of the first guess, 0: of no use, and their numbers of strips."""
+    """(MAX_WINDOWS + 1,): number of windows of the first guess (0: not usable), and their numbers of strips."""
     fresh: np.ndarray
-    """(2, MAX_RUNS + 1): tips of windows to be, m."""
+    """(2, MAX_RUNS + 1): tips of new windows, m."""
     tops: np.ndarray
     """(MAX_WINDOWS,): largest c of each window, m^2."""
     measure: np.ndarray
-    """(n,): integral over the nodes of what widths are inverse to, see `grading`."""
+    """(n,): integral over s, at the nodes, of the density rho of strips, see `grading`."""
     looked: np.ndarray
     """(1,): number of nodes."""
     stride: np.ndarray
@@ -98,12 +102,12 @@ class NormalWork(NamedTuple):
     """Window of each strip."""
     centre: np.ndarray
     width: np.ndarray
-    """Place and width of the strips, m."""
+    """Position s of the middle and width of the strips, m."""
     rates: np.ndarray
-    """(4, MAX_STRIPS): rates of centre and width by the lower and upper tip of the strip's window."""
+    """(4, MAX_STRIPS): derivatives of centre and width with respect to the lower and upper tip of the window."""
     place: np.ndarray
     own: np.ndarray
-    """Place and width along the strips' own planes, m."""
+    """Position and width of the strips over the unrolled surface, m, see `gap.unroll`."""
     share: np.ndarray
     """Q: p = pi E* Q sqrt(c - (x - X)^2), 1/m."""
     square: np.ndarray
@@ -115,24 +119,24 @@ class NormalWork(NamedTuple):
     logs: np.ndarray
     """(2, MAX_STRIPS): ln c and 1/a of the strips."""
     sums: np.ndarray
-    """(4, 4): what the points of one strip gather."""
+    """(4, 4): loaded gap at the points of one strip, and its derivatives over x and s."""
     matrix: np.ndarray
     """(MAX_UNKNOWNS, MAX_UNKNOWNS + 1): Jacobian and residual."""
     kept: np.ndarray
-    """The same before it is solved."""
+    """Copy of ``matrix`` before its solution."""
     active: np.ndarray
     load: np.ndarray
-    """Fixed strips in contact and their loads."""
+    """Whether a fixed strip is in contact, and the load of each fixed strip."""
     more: np.ndarray
-    """(4,): widths of windows count this many times where strips are counted, 1 or `windows.MORE`; the weight that the
-    solution with MORE has in the mean of both (found with 1); this weight of the first guess; and not 0 where strips
-    are fixed."""
+    """(4,). WIDENED: factor of a window's width where its strips are counted, 1 or `windows.BLENDING_RATIO`. WEIGHT:
+    weight of the solution with the larger factor in the mean of both solutions (found with 1). GUESS: this weight for
+    the first guess. FIXED: not 0 if strips are fixed because no tips were found."""
     left: np.ndarray
-    """(2,): steps of Newton's iteration that are left to a patch, none below 1; and those that it has at first."""
+    """(2,): remaining Newton steps of a patch (the search ends at 0), and their number at the beginning."""
 
 
 def normal_work():
-    """`NormalWork` for the solution of one patch at a time."""
+    """Return a `NormalWork` for the solution of one patch at a time."""
     n, m = MAX_STRIPS, MAX_WINDOWS
     return NormalWork(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
@@ -147,7 +151,7 @@ def normal_work():
 
 @jit(allocates=False, fastmath=FUSED)
 def lay_out_strips(geometry, pose, frame, work, windows):
-    """Centres, widths and gaps of the strips between the windows' tips."""
+    """Fill centres, widths and gaps of the strips between the tips of the windows."""
     u, ur = work.gap[0, U], work.gap[0, UR]
     for k in range(windows):
         first, last = work.start[k], work.start[k + 1]
@@ -165,7 +169,7 @@ def lay_out_strips(geometry, pose, frame, work, windows):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _compensate(work, column, first, last):
-    """Add a share of the second difference over the strips: what pressures constant across a strip leave in u."""
+    """Add a fraction of the second difference over the strips to a gap column, see `COMPENSATION`."""
     gap, centre, width = work.gap, work.centre, work.width
     before, here = gap[first, column], gap[first + 1, column]
     bend = 0.0
@@ -182,7 +186,9 @@ def _compensate(work, column, first, last):
 
 @jit(allocates=False, fastmath=FUSED)
 def assemble(values, work, windows, kinds):
-    """Residual (last column) and Jacobian of Galerkin's conditions and of the tips; kinds = 2 without yaw, else 3."""
+    """Fill the Jacobian and (last column) the residual of the conditions for strips and tips; return their number.
+
+    ``kinds`` is the number of unknowns of a strip: 2 without yaw, else 3."""
     strips = work.start[windows]
     n = kinds * strips + 2 * windows
     matrix, tips, sums = work.matrix, kinds * strips, work.sums
@@ -265,7 +271,8 @@ def assemble(values, work, windows, kinds):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _close_strip(work, i, kinds, points, tips, n):
-    """Residual of strip i and what its own half length, middle and place do to it."""
+    """Fill the residual of strip i and add its derivatives with respect to half length, middle and position of strip
+    i."""
     own, k, row, matrix, sums = work.window[i], kinds * i, work.gap[i], work.matrix, work.sums
     a, stretch = math.sqrt(work.square[i]), work.own[i] / work.width[i]
     for m in range(points):
@@ -285,7 +292,7 @@ def _close_strip(work, i, kinds, points, tips, n):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _third(work, i, r):
-    """Weight of the r-th of four strips from i on in their third difference, over the cube of their mean distance."""
+    """Weight of the r-th of the strips i to i + 3 in their third difference, for a mean distance of 1."""
     s, product = work.centre, 1.0
     for q in range(4):
         if q != r:
@@ -296,7 +303,10 @@ def _third(work, i, r):
 
 @jit(allocates=False, fastmath=FUSED)
 def _smooth(work, own, kinds, points, n):
-    """Where strips are narrow a wiggle of the edge is hardly felt: third differences of c (and X) are held down."""
+    """Add a penalty on third differences of c (and X) of the strips of a window.
+
+    With narrow strips, oscillations of the contact's edge hardly change the gap, so that the conditions alone do not
+    exclude them."""
     first, last, matrix = work.start[own], work.start[own + 1], work.matrix
     largest = 0.0
     for i in range(first, last):
@@ -318,7 +328,7 @@ def _smooth(work, own, kinds, points, n):
 
 @jit(allocates=False, fastmath=FUSED)
 def gap_under_load(values, work, windows, s, x, gap):
-    """Gap (m) between the loaded surfaces at (x, s) where the undeformed one is ``gap``."""
+    """Gap (m) between the loaded surfaces at (x, s), where the gap of the undeformed surfaces is ``gap`` (m)."""
     for j in range(work.start[windows]):
         inverse = 1.0 / math.sqrt(work.square[j])
         stretch = work.own[j] / work.width[j]
@@ -327,7 +337,7 @@ def gap_under_load(values, work, windows, s, x, gap):
         xi = abs(x - work.middle[j]) * inverse
         if low > 1e-9:
             value = influence_of(values, xi, low, high, edges_of(low, high, math.log(low), math.log(high)))[0]
-        else:  # inside the strip: twice the half of it
+        else:  # inside the strip: twice the influence of half of it
             half = 0.5 * w * inverse
             value = influence_of(values, xi, -1.0, half, edges_of(-1.0, half, 0.0, math.log(half)))[0]
         gap += work.share[j] * work.square[j] * value

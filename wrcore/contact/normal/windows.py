@@ -1,7 +1,7 @@
-"""Windows of strips, one per lobe of contact: first guesses from the overlaps, and repairs after a solution.
+"""Windows of strips, one per sub-patch: first guesses from the overlaps, and repairs after a solution.
 
-Without a memory of the last solution what the windows are depends on the pose alone: they start from the overlaps. With
-one they stay, where others fit as well (`wrcore.contact.normal.solve.solve_patch`).
+Without a memory of the last solution the windows start from the overlaps and depend only on the position and attitude.
+With a memory they are kept if several sets of windows fit (`wrcore.contact.normal.solve.solve_patch`).
 """
 
 import math
@@ -23,30 +23,30 @@ from wrcore.contact.search.reduction import CURVATURE_X, CURVATURE_Y
 from wrcore.kernels.jit import FUSED, jit
 
 FEWEST_STRIPS, SLENDER_WINDOW = 8, 4.0
-"""Strips of a slender window, whatever the usual resolution, and the length over width from which it is one."""
+"""Minimum number of strips of a slender window, and the ratio of length to width from which a window is slender."""
 
 _USUAL = 16
-"""Strips of wide windows beyond which slender ones have more, too: where rails have sharp edges."""
+"""Resolution above which slender windows have more than FEWEST_STRIPS strips: for rails with sharp edges."""
 
 BLENDING_RATIO = 1.05
-"""Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
+"""Factor of a window's width: if the wider window would have more strips, the result is the mean of both solutions."""
 
 _STEPS = (1.0 / SLENDER_WINDOW, 1.2, 1.8)
-"""Widths over lengths at which the number of strips steps."""
+"""Ratios of width to length at which the number of strips changes."""
 
 _SADDLE = 0.02
-"""A lobe of its own rises by this share of the deepest penetration from its neighbour."""
+"""Minimum height of the saddle between two sub-patches, over the maximum penetration."""
 
 _MERGE = 0.3
-"""Windows closer than this share of a strip are one."""
+"""Distance of two windows, over the width of a strip, below which they are merged."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def guess_squares(hertz, patches, first, work, stretches):
-    """First guess of c and Q at the nodes: shape-corrected virtual penetration of every lobe.
+    """Fill the first guess of c and Q at the nodes, from the shape-corrected virtual penetration of every sub-patch.
 
-    For a lobe of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's ellipse of
-    the overlap, and Q of that ellipse: exact for an ellipse."""
+    For a sub-patch of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's
+    ellipse of the overlap, and Q of that ellipse. This is exact for an ellipse."""
     nodes = work.nodes
     begin = 0
     for k in range(stretches):
@@ -58,7 +58,7 @@ def guess_squares(hertz, patches, first, work, stretches):
             least = min(least, nodes[NODE_GAP, i])
         share = 1.5 * stiffness / (math.pi * math.pi * a * a * b)
         i = begin
-        while i < end:  # lobe by lobe: down to its bottom, then up until the gap has fallen again from a saddle
+        while i < end:  # for each sub-patch: down to its minimum gap, then up until the gap falls again after a saddle
             start = i
             bottom = top = nodes[NODE_GAP, i]
             top_at = i
@@ -86,7 +86,7 @@ def guess_squares(hertz, patches, first, work, stretches):
 
 @jit(allocates=False, fastmath=FUSED)
 def guess_at(work, count, s):
-    """First guess of c (m^2, linear between nodes) and Q (1/m) at s."""
+    """First guess of c (m^2, interpolated linearly between nodes) and Q (1/m) at ``s``."""
     nodes = work.nodes
     for i in range(1, count):
         if nodes[S, i] >= s and nodes[S, i] > nodes[S, i - 1]:
@@ -97,10 +97,10 @@ def guess_at(work, count, s):
 
 @jit(allocates=False, fastmath=FUSED)
 def count_strips(width, length, resolution, more):
-    """Strips of a window: few where it is slender, more where it is wide (it then has lobes).
+    """Number of strips of a window: few if it is slender, more if it is wide and may have several pressure maxima.
 
-    Just below a width at which the number steps ``more`` (see `NormalWork`) gets the weight of the larger number: it
-    rises from 0 to 1, so that forces do not step. It is the largest over the windows."""
+    Just below a width at which the number changes, the weight of the solution with more strips rises from 0 to 1, so
+    that forces are continuous. ``more`` (see `NormalWork`) gets the maximum of this weight over the windows."""
     ratio = more[WIDENED] * width / length
     for step in _STEPS:
         t = (BLENDING_RATIO * ratio / step - 1.0) / (BLENDING_RATIO - 1.0)
@@ -114,7 +114,7 @@ def count_strips(width, length, resolution, more):
 
 @jit(allocates=False, fastmath=FUSED)
 def guess_windows(work, stretches, resolution):
-    """Windows where the guess of c is positive. Returns their number."""
+    """Fill the windows where the guess of c is positive; return their number."""
     nodes, count, windows = work.nodes, work.ends[stretches - 1], 0
     inside, largest, work.more[WEIGHT] = False, 0.0, 0.0
     for i in range(count):
@@ -148,7 +148,9 @@ def guess_windows(work, stretches, resolution):
 
 @jit(allocates=False)
 def _number(work, windows):
-    """From counts of strips (in start[1:]) to first strips of the windows; fewer each where they do not all fit."""
+    """Convert numbers of strips (in ``work.start[1:]``) to first strips of the windows.
+
+    If there are more than MAX_STRIPS in all, numbers are reduced to an equal part of MAX_STRIPS."""
     total = 0
     for k in range(windows):
         total += work.start[k + 1]
@@ -162,7 +164,7 @@ def _number(work, windows):
 
 @jit(allocates=False, fastmath=FUSED)
 def start_strips(geometry, pose, frame, work, windows, stretches):
-    """Strips of the windows with the guess of c (never nothing) and of Q."""
+    """Fill the strips of the windows with the guess of c (at least a positive minimum) and of Q."""
     count = work.ends[stretches - 1]
     work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
     lay_out_strips(geometry, pose, frame, work, windows)
@@ -181,7 +183,7 @@ def start_strips(geometry, pose, frame, work, windows, stretches):
 
 @jit(allocates=False)
 def active_runs(work, windows):
-    """Runs of active strips, into ``work.fresh``: their number, and the largest c."""
+    """Write the ends of the runs of active strips to ``work.fresh``; return their number and the maximum c (m^2)."""
     found, inside, largest = 0, False, 0.0
     for i in range(work.start[windows]):
         if inside and (not work.active[i] or work.window[i] != work.window[i - 1]):
@@ -196,7 +198,7 @@ def active_runs(work, windows):
 
 @jit(allocates=False, fastmath=FUSED)
 def drop_starved(work, windows, resolution):
-    """Windows of the runs of strips that kept their pressure after a starved iteration. Returns their number."""
+    """Rebuild the windows from the strips that still have pressure after an iteration; return their number."""
     largest = top_squares(work, windows)
     for i in range(work.start[windows]):
         top = work.tops[work.window[i]]
@@ -206,7 +208,7 @@ def drop_starved(work, windows, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def merge_close(work, windows, resolution):
-    """Windows closer than a share of a strip become one. Returns their number."""
+    """Merge windows that are closer than a fraction of a strip's width; return the number of windows."""
     lows, highs = work.fresh[0], work.fresh[1]
     found = 0
     for k in range(windows):
@@ -223,13 +225,15 @@ def merge_close(work, windows, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def take_fresh(work, found, largest, resolution):
-    """Windows from their tips in ``work.fresh``: as many strips as guessed if they are as many as were guessed."""
+    """Create windows from the tips in ``work.fresh``; return their number.
+
+    If there are as many windows as guessed, they get the guessed numbers of strips."""
     known, length = found == work.guessed[0], 2.0 * math.sqrt(largest)
     work.more[WEIGHT] = work.more[GUESS] if known else 0.0
     kept = 0
     for k in range(found):
         width = work.fresh[1, k] - work.fresh[0, k]
-        if width > 0.0:  # not turned inside out by an iteration that failed
+        if width > 0.0:  # a failed iteration may have exchanged the tips
             work.low[kept], work.high[kept] = work.fresh[0, k], work.fresh[1, k]
             kept += 1
             work.start[kept] = work.guessed[k + 1] if known else count_strips(width, length, resolution, work.more)
@@ -239,9 +243,10 @@ def take_fresh(work, found, largest, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def count_again(work, windows, counts, strips, resolution):
-    """Number the strips of windows that are not those of the first guess as in the solution they had: ``counts``: of
-    each window the end of its strips (then two numbers more), ``strips``: of each strip three numbers, c the second.
-    Whether each still wants as many."""
+    """Give windows the numbers of strips of their last solution; return whether these are still the right numbers.
+
+    ``counts`` has three numbers for each window, first the end of its strips. ``strips`` has three numbers for each
+    strip, c the second."""
     work.more[WEIGHT], largest = 0.0, 0.0
     for i in range(int(counts[3 * (windows - 1)])):
         largest = max(largest, strips[3 * i + 1])
@@ -256,8 +261,10 @@ def count_again(work, windows, counts, strips, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def newborn(values, work, windows, stretches, resolution, least):
-    """Windows where the loaded surfaces interpenetrate outside the windows, by ``least`` of the deepest penetration,
-    are added. Returns the new number; -1 where there may be no more."""
+    """Add windows where the loaded surfaces overlap outside the windows; return the new number of windows.
+
+    ``least`` is the minimum of this overlap over the maximum penetration. Returns -1 if there would be more than
+    MAX_WINDOWS."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     depth = 0.0
     for i in range(count):
@@ -284,7 +291,7 @@ def newborn(values, work, windows, stretches, resolution, least):
             found, open_at = found + 1, -1
     if found == windows:
         return windows
-    for i in range(1, found):  # in order
+    for i in range(1, found):  # insertion sort by the lower tip
         low, high = lows[i], highs[i]
         j = i - 1
         while j >= 0 and lows[j] > low:
@@ -296,9 +303,10 @@ def newborn(values, work, windows, stretches, resolution, least):
 
 @jit(allocates=False, fastmath=FUSED)
 def overlooked(work, windows, stretches):
-    """What strips overlook: by which share of the deepest penetration the gap at nodes between two strips of a window
-    leaves the parabola through theirs and the next one's, in the mean. Slender windows have sharp ends on flanges, and
-    no room for waves."""
+    """Mean deviation of the gap from its interpolation between strips, over the maximum penetration.
+
+    At each node between two strips of a window the gap is compared with the parabola through the gaps of these strips
+    and a neighbour. Slender windows are left out: they have sharp ends on flanges, and are too narrow for waves."""
     nodes, count, least, total, looked = work.nodes, work.ends[stretches - 1], -1e-300, 0.0, 1
     centre, strip, last = work.centre, 0, work.start[windows] - 1
     top_squares(work, windows)
