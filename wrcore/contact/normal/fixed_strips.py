@@ -1,4 +1,4 @@
-"""Windows from fixed strips over the overlaps: slower than a guess, and safe.
+"""Contact windows by an active set on strips of fixed width: the fallback when Newton's iteration fails.
 
 References
 ----------
@@ -14,26 +14,28 @@ from wrcore.contact.normal.windows import active_runs, newborn, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
 FIXED = 32
-"""Fixed strips, where the first guess of the windows has failed."""
+"""Number of fixed strips of a patch."""
 
 _SWEEPS, _AGAIN = 16, 8
-"""Of half lengths and loads, at most, from the overlaps and from the last solution."""
+"""Maximum number of sweeps over half lengths and loads: from the overlaps, and from the last solution."""
 
 _KEPT = 3
-"""Sweeps of which the next one's half lengths are mixed."""
+"""Number of sweeps whose half lengths are combined for the next sweep."""
 
 _ALLOWED_OVERLAP = 0.01
-"""Share of the deepest penetration by which loaded surfaces may interpenetrate beside strips that go on."""
+"""Maximum overlap of the loaded surfaces outside strips taken from the last solution, over the maximum penetration."""
 
 _SETTLED, _CONVERGED = 0.02, (0.05, 0.002)
-"""A solution stands if no c would move by more than this share of the largest, and is gone on with until none would by
-the second of two, the first where strips are placed anew."""
+"""Limits of the largest change of c over the maximum c: for a usable solution, and for the end of sweeps. The first of
+two limits holds before the strips are refined, the second for the final strips."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
-    """Fixed strips over all overlaps, then finer ones about the runs that carry load, and their loads. Returns the
-    number of windows (0 where no loads were found) and of runs, the largest c, and by what share of it c moved last."""
+    """Solve for loads on fixed strips over all overlaps, then on finer strips around the runs that carry load.
+
+    Returns the number of windows (0 if no loads were found) and of runs, the maximum c (m^2), and the last change of c
+    over this maximum."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     low, high, found, largest, moved = 1e9, -1e9, 0, 0.0, -1.0
     for i in range(count):
@@ -63,8 +65,10 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
 
 @jit(allocates=False, fastmath=FUSED)
 def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
-    """Windows from fixed strips. Returns their number and leaves c and Q of the fixed strips at the nodes as the next
-    guesses. Where more lobes carry than there may be windows: 0, and no steps are left."""
+    """Create windows from the solution on fixed strips; return their number.
+
+    Writes c and Q of the fixed strips to the nodes as the next guesses. If more than MAX_WINDOWS sub-patches carry
+    load, returns 0 and ends the search (``work.left``)."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     windows, found, largest, _ = _fixed_strips(geometry, pose, frame, values, work, stretches, 2)
     if found > MAX_WINDOWS:
@@ -86,10 +90,10 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
 
 @jit(allocates=False, fastmath=FUSED)
 def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
-    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
-    number of windows; 0 where c does not come to rest.
+    """Solve the normal problem on fixed strips, if Newton's iteration has no solution; return the number of windows.
 
-    A ``memory`` of windows in vain (see `solve_patch`) keeps the strips: they go on from there if c comes to rest."""
+    The tips have errors of up to a strip's width. Returns 0 if c does not converge. A ``memory`` of a failed search
+    (see `solve_patch`) holds the strips, from which the next solution starts."""
     windows, moved = _go_on(geometry, pose, frame, values, work, stretches, kinds, memory)
     if windows == 0:
         windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
@@ -103,7 +107,7 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
         for i in range(first, end):
             if not work.active[i]:
                 continue
-            lobe += int(i > 0 and (i == first or not work.active[i - 1]))  # ends at tips of its own
+            lobe += int(i > 0 and (i == first or not work.active[i - 1]))  # each run of active strips has two tips
             work.centre[kept], work.width[kept], work.window[kept] = work.centre[i], work.width[i], lobe
             work.share[kept], work.square[kept] = work.load[i] / work.square[i], work.square[i]
             work.middle[kept] = work.middle[i]
@@ -116,8 +120,10 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
 
 @jit(allocates=False, fastmath=FUSED)
 def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
-    """The solution from the last one on the same strips: their windows, and by what share of the largest c one would
-    move; no windows where none are kept, where the patch has grown beyond them, or c does not come to rest."""
+    """Start from the last solution on the same strips; return the number of windows and the last relative change of c.
+
+    The change is relative to the maximum c. Returns no windows if ``memory`` has none, if the patch has grown beyond
+    them, or if c does not converge."""
     if not (memory[0] < 0.0 < memory[KEPT]):
         return 0, -1.0
     windows = int(memory[KEPT])
@@ -142,7 +148,7 @@ def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
 
 @jit(allocates=False)
 def _keep(frame, work, windows, memory):
-    """Note the strips for `_go_on`, about the place that the memory is of."""
+    """Write the strips to ``memory`` for `_go_on`, relative to the position stored in it."""
     shift = (memory[2] - frame.ur) * frame.cosine + (memory[3] - frame.z) * frame.sine
     memory[KEPT] = windows
     for k in range(windows):
@@ -156,7 +162,7 @@ def _keep(frame, work, windows, memory):
 
 @jit(allocates=False, fastmath=FUSED)
 def _press(work, windows):
-    """First guess: each strip by itself."""
+    """Fill the first guess of c and the middles, for each strip without influence of the others."""
     for i in range(work.start[windows]):
         work.active[i] = work.gap[i, GAP] < 0.0
         work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * work.width[i] ** 2)
@@ -165,8 +171,10 @@ def _press(work, windows):
 
 @jit(allocates=False, fastmath=FUSED)
 def _carry(values, work, windows, kinds, sweeps, rest):
-    """Loads of fixed strips by an active set at given half lengths and middles, these from the loads (middles for
-    ``kinds`` = 3, with yaw) until they ``rest``; by which share of the largest c one would move, -1 without loads."""
+    """Solve for the loads of fixed strips by an active set, in turn with half lengths and (with yaw) middles.
+
+    Sweeps end when the largest change of c, over the maximum c, is at most ``rest``. With ``kinds`` = 3 (yaw), middles
+    change too. Returns the last change, or -1 if there are no loads."""
     strips, matrix, load = work.start[windows], work.matrix, work.load
     offset, moved, points = kinds * strips + 2 * windows, 0.0, kinds - 1.0  # twice the points with yaw
     for sweep in range(sweeps):
@@ -197,7 +205,7 @@ def _carry(values, work, windows, kinds, sweeps, rest):
             left[i] = (wanted[i] - work.square[i]) / largest
             left[strips + i] /= math.sqrt(largest)
             moved = max(moved, abs(left[i]), abs(left[strips + i]))
-        if moved <= rest or sweep + 1 == sweeps:  # c and the loads belong together
+        if moved <= rest or sweep + 1 == sweeps:  # leave before c changes, so that it agrees with the loads
             break
         _mix(work, strips, min(sweep, _KEPT - 1), sweep)
     return moved
@@ -205,8 +213,9 @@ def _carry(values, work, windows, kinds, sweeps, rest):
 
 @jit(allocates=False, fastmath=FUSED)
 def _mix(work, strips, others, sweep):
-    """c and middles for the next sweep: of what the last ``others`` + 1 sweeps wanted the mix that leaves least of what
-    they left, if changes are linear (Anderson 1965)."""
+    """Set c and middles for the next sweep by Anderson's method (1965) from the last ``others`` + 1 sweeps.
+
+    The combination of their results has the minimum residual if residuals are linear."""
     kept, matrix, mine = work.kept, work.matrix, 2 * (sweep % _KEPT)
     for one in range(others):
         at = 2 * ((sweep - 1 - one) % _KEPT)
@@ -230,7 +239,9 @@ def _mix(work, strips, others, sweep):
 
 @jit(allocates=False, fastmath=FUSED)
 def _active_set(work, strips, kinds, n, offset):
-    """Loads of the strips at their half lengths: none pulls, none that carries nothing is pressed in."""
+    """Solve for the loads of the strips at given half lengths by an active set; False if this fails.
+
+    All loads are positive in the active set; other strips have no load and no overlap."""
     matrix, active, load = work.matrix, work.active, work.load
     for _ in range(12):
         used = 0
@@ -270,8 +281,9 @@ def _active_set(work, strips, kinds, n, offset):
 
 @jit(allocates=False)
 def _widened(work, found, low, high, by):
-    """Windows of the runs, wider by ``by`` at either end; those that meet are one, and all where they are too many.
-    Returns their number."""
+    """Create windows from the runs, extended by ``by`` (m) at either end; return their number.
+
+    Windows that touch are merged; if there are more than MAX_WINDOWS, all are merged."""
     windows = 0
     for k in range(found):
         first, last = max(work.fresh[0, k] - by, low), min(work.fresh[1, k] + by, high)

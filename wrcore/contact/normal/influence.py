@@ -6,7 +6,7 @@ bodies then approach each other by (Boussinesq; Johnson, Contact Mechanics, Eq. 
     u = Q a^2 (U(xi, eta+) - U(xi, eta-)),   U(xi, eta) = int_-1^1 sqrt(1 - t^2) asinh(eta/|xi - t|) dt,
 
 with xi = (x - X)/a and eta+- = (s - s_j +- w/2)/a. U is even in xi and odd in eta. U/eta is tabulated as a bicubic
-B-spline over ln eta and tau, which is xi stretched around the strip's end, xi = 1.
+B-spline over ln eta and tau, a function of xi with a high resolution around the strip's end, xi = 1.
 """
 
 import math
@@ -24,13 +24,13 @@ _TAU_START, _TAU_STEP, _TAU_NODES = -1.01, 0.025, 120
 _LOG_START, _LOG_STEP, _LOG_NODES = -7.6, 0.125, 92
 _LOG_END = _LOG_START + _LOG_STEP * (_LOG_NODES - 5)
 _FAR = 16.0
-"""Square of the distance (over the half length) from which the field's expansion is used."""
+"""Square of the distance, over the half length, beyond which the far-field expansion is used."""
 
 _HALF_PI = 0.5 * math.pi
 
 
 def exact_influence(xi, eta):
-    """U(xi, eta > 0) by Gauss-Legendre quadrature graded towards the singular points."""
+    """Return U(xi, eta > 0) by Gauss-Legendre quadrature with nodes graded towards the singular points."""
     xi, eta = np.broadcast_arrays(np.abs(np.asarray(xi, float))[..., None], np.asarray(eta, float)[..., None])
     node, weight = np.polynomial.legendre.leggauss(160)
     v, weight = 0.5 * (node + 1.0), 0.5 * weight
@@ -48,10 +48,10 @@ def exact_influence(xi, eta):
 
 @lru_cache(maxsize=1)
 def influence_table():
-    """B-spline coefficients of U/eta (tau, ln eta), for kernels."""
-    from scipy.ndimage import spline_filter  # only scenes with exact contact wait for its import
+    """Return the B-spline coefficients of U/eta over (tau, ln eta), for kernels."""
+    from scipy.ndimage import spline_filter  # imported here, so that only scenes with exact contact wait for it
 
-    extra = 14  # nodes beyond either end, so that what the spline assumes there does not matter
+    extra = 14  # nodes beyond either end, so that the spline's boundary condition has no effect in the table
     tau = _TAU_START + _TAU_STEP * (np.arange(_TAU_NODES + 2 * extra) - 1 - extra)
     square = 0.5 * (tau**4 + np.sqrt(tau**8 + 4.0 * tau**4 * _BLUR**2))
     xi = 1.0 + np.sign(tau) * np.sqrt(square)
@@ -63,7 +63,7 @@ def influence_table():
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def spline_weights(t):
-    """Values and slopes of the four cubic B-splines at the part t of a cell."""
+    """Values and derivatives of the four cubic B-splines at the position ``t`` in a cell, 0 to 1."""
     s, half = 1.0 - t, 0.5
     t2, s2 = t * t, s * s
     sixth = 1.0 / 6.0
@@ -77,7 +77,7 @@ def spline_weights(t):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def cell_along(xi):
-    """Cell, part of it, and d tau/d xi / step of the table for |xi|."""
+    """Return the table's cell for |xi|, the position in it (0 to 1), and (d tau/d xi) / (table step)."""
     r = xi - 1.0
     square = r * r + _BLUR * _BLUR
     q = math.sqrt(square)
@@ -90,7 +90,8 @@ def cell_along(xi):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def cell_across(log_eta):
-    """Cell, part of it, and ln eta beyond the table's end."""
+    """Return the table's cell for ln eta, the position in it (0 to 1), and the excess of ln eta over the table's
+    end."""
     inside = min(max(log_eta, _LOG_START), _LOG_END)
     position = (inside - _LOG_START) * (1.0 / _LOG_STEP)
     cell = min(int(position), _LOG_NODES - 4)
@@ -99,8 +100,10 @@ def cell_across(log_eta):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _edge(eta, log_eta, sign):
-    """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table,
-    where U grows with pi/2 ln eta."""
+    """Interpolation data for one edge of a strip: a column of the table and weights of its values.
+
+    Returns the column, weights for sign times U, weights for sign times dU/d(ln eta), and additions to both beyond the
+    table's end, where U increases as pi/2 ln eta."""
     cell, part, beyond = cell_across(log_eta)
     v0, v1, v2, v3, d0, d1, d2, d3 = spline_weights(part)
     factor, over, rest = sign * eta, sign * eta, 0.0
@@ -114,8 +117,10 @@ def _edge(eta, log_eta, sign):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def edges_of(low, high, log_low, log_high):
-    """What `influence_of` wants of a strip's edges at eta = low and high and their logarithms; the line's own strip,
-    -high to high, has a negative ``low``."""
+    """Interpolation data (`_edge`) of both edges of a strip at eta = ``low`` and ``high``, for `influence_of`.
+
+    ``log_low`` and ``log_high`` are the logarithms. A negative ``low`` denotes the strip that contains the line of the
+    point, -high to high."""
     if low < 0.0:
         return _edge(high, log_high, 0.0), _edge(high, log_high, 2.0)
     return _edge(low, log_low, -1.0), _edge(high, log_high, 1.0)
@@ -123,7 +128,9 @@ def edges_of(low, high, log_low, log_high):
 
 @intrinsic
 def _contract(_, values, start, columns, weights, of_values, of_slopes):
-    """Sum over a 4 x 4 block of the table at each of two columns: U and dU/d tau of both, dU/d(ln eta) of either."""
+    """Sum over a 4 x 4 block of the table at each of two columns.
+
+    Returns U and dU/d tau summed over both columns, and dU/d(ln eta) of each column."""
 
     def generate(context, builder, signature, arguments):
         four = ir.VectorType(ir.DoubleType(), 4)
@@ -178,11 +185,11 @@ def _contract(_, values, start, columns, weights, of_values, of_slopes):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _expanded(xi, low, high):
-    """Difference of U between eta = high and low (and its slopes, as `_tabulated`) far from the strip."""
+    """Difference of U between eta = high and low far from the strip, and its derivatives, as in `influence_of`."""
     square = xi * xi
     near, far = math.sqrt(square + low * low), math.sqrt(square + high * high)
     if low < 0.0:
-        # the strip's own line: eta = +-high
+        # the strip contains the line of the point: eta = +-high
         log = 2.0 * math.log((high + far) / xi)
         slope, over, shear = -2.0 * high / (xi * far), 2.0 * high / far, 0.0
     else:
@@ -202,8 +209,10 @@ def _expanded(xi, low, high):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def influence_of(values, xi, low, high, edges):
-    """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0, with its slopes over xi, over ln
-    eta, and over eta (the difference of the two slopes); ``edges``: see `edges_of`."""
+    """Difference of U between eta = high and low >= 0, or 2 U(high) for low < 0, and its derivatives.
+
+    Derivatives are with respect to xi, ln eta (of both edges together), and a common displacement of both edges in eta.
+    ``edges``: see `edges_of`."""
     if xi * xi + max(low, 0.0) ** 2 > _FAR:
         return _expanded(xi, low, high)
     cell, part, rate = cell_along(xi)
