@@ -1,1 +1,1 @@
-"""Where wheel and rail touch, and how hard."""
+"""Contact of wheel and rail: position, pressure and friction of contact patches."""

@@ -1,14 +1,14 @@
-"""Rise and slip of a contact patch by the load and the friction of another one on the same half-space.
+"""Elastic displacement and slip of a contact patch by the load and the friction of another one on the same half-space.
 
-The pressure of one patch lifts the other by Boussinesq's formula, and tilts it, because the near side rises by more.
-Friction gives it a rigid slip by Cerruti's formula: the slope of the surface displacement along x (K. L. Johnson,
-Contact Mechanics, 3.2 and 3.6). A rise changes the load of a patch by its mean over the pressure under a flat punch
-(Betti's theorem), so the rise of patch i by patch j is
+The pressure of one patch displaces the surface under the other (Boussinesq's formula), and tilts it, because the
+displacement is larger on the near side. Friction causes a rigid slip (Cerruti's formula): the slope of the surface
+displacement along x (K. L. Johnson, Contact Mechanics, 3.2 and 3.6). A displacement changes the load of a patch by its
+mean weighted with the pressure under a flat punch (Betti's theorem). The displacement of patch i by patch j is
 
     N_j / (pi E*) times the mean of 1/r
 
-over Hertz's pressure on j and a punch's pressure on i. Along x the means are Gauss sums of three points, across the
-patch they are of second order.
+over Hertz's pressure on j and a punch's pressure on i. Means along x are Gauss sums of three points; means across the
+patch are of second order.
 """
 
 import math
@@ -20,27 +20,27 @@ from wrcore.kernels.jit import FUSED, jit
 
 _HERTZ_PLACES, _HERTZ_PARTS = np.array([-1.0, 0.0, 1.0]) * math.sqrt(3.0 / 7.0), np.array([7.0, 16.0, 7.0]) / 30.0
 _PUNCH_PLACES, _PUNCH_PARTS = np.array([-1.0, 0.0, 1.0]) * math.sqrt(0.6), np.array([5.0, 8.0, 5.0]) / 18.0
-"""Places along x over the half length, and weights, of Hertz's pressure and of a punch's pressure."""
+"""Gauss points along x over the half length, and weights, for Hertz's pressure and for a punch's pressure."""
 
 
 class Ellipse(NamedTuple):
-    """Place and size of a patch: all that other patches feel of its form."""
+    """Position, size and contact angle of a patch, which determine its influence on other patches."""
 
     x: float
     y: float
     z: float
-    """Its centre, m, in axes shared by all patches of a wheel."""
+    """Centre, m, in axes shared by all patches of a wheel."""
     a: float
     b: float
-    """Semi-axes along and across, m."""
+    """Semi-axes in the rolling direction and across, m."""
     cosine: float
     sine: float
-    """Cosine and sine of its contact angle."""
+    """Cosine and sine of the contact angle."""
 
 
 @jit(allocates=False, forceinline=True)
 def ellipse_of(values):
-    """The `Ellipse` of an array (7,)."""
+    """Return the `Ellipse` whose fields are in an array (7,)."""
     return Ellipse(values[0], values[1], values[2], values[3], values[4], values[5], values[6])
 
 
@@ -52,7 +52,7 @@ def write_ellipse(values, x, y, z, a, b, cosine, sine):
 
 @jit(allocates=False, fastmath=FUSED)
 def rise_by_pressure(one, other):
-    """Mean of 1/r between two patches (1/m), and its slope across the first one (1/m^2)."""
+    """Mean of 1/r between two patches (1/m), and its derivative across the first one (1/m^2)."""
     dx, dy, dz = one.x - other.x, one.y - other.y, one.z - other.z
     square, value, slope, width = dy * dy + dz * dz, 0.0, 0.0, one.b * one.b
     spread = 0.5 * (0.2 * other.b * other.b + width / 3.0)
@@ -68,15 +68,16 @@ def rise_by_pressure(one, other):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _moment_share(other):
-    """Share of the friction moment of a patch that forces across it make: all of it in a slender patch."""
+    """Fraction of the friction moment of a patch that is due to lateral forces: 1 in a slender patch."""
     ratio = other.b * other.b / (other.a * other.a)
     return max(1.0 - ratio, 0.0) / (1.0 + ratio)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def slip_by_friction(poisson_ratio, one, other, fx, fy, mz):
-    """Creepages that friction on the other patch gives the first one, times pi G (N/m^2): ``fx``, ``fy`` (N) along and
-    across, moment ``mz`` (N m)."""
+    """Longitudinal and lateral creepage of the first patch by friction on the other one, times pi G (N/m^2).
+
+    Friction on the other patch: ``fx``, ``fy`` (N) along and across, moment ``mz`` (N m)."""
     dx, dy, dz = one.x - other.x, one.y - other.y, one.z - other.z
     square = dy * dy + dz * dz
     spread = 0.2 * (one.b * one.b + other.b * other.b)

@@ -1,11 +1,11 @@
-"""Normal contact: Hertz's ellipse with exact elliptic integrals, and Eq. (7) with its damping factor.
+"""Normal contact by Hertz's ellipse with exact elliptic integrals, and the normal force of Eq. (7) with damping.
 
 For the gap A x^2 + B y^2 (x rolling, y lateral) and an approach delta, Hertz's solution is written as
 
     N = (4/3) E* k(l) (A + B)^(-1/2) delta^(3/2),    a = p(l) sqrt(delta / (A + B)),    b = p(-l) sqrt(delta / (A + B))
 
 with l = ln(B/A). The shape functions k (even) and p are tabulated once from the elliptic integrals and interpolated,
-so that a contact costs no iteration.
+so that no iteration is needed in a contact.
 """
 
 import math
@@ -26,7 +26,7 @@ class HertzTable(NamedTuple):
 
     step: float
     values: np.ndarray
-    """(n, 8): p(l), p(-l), k and ln(a/b) at l = -LOG_RATIO_MAX + i * step, then their slopes times the step."""
+    """(n, 8): p(l), p(-l), k and ln(a/b) at l = -LOG_RATIO_MAX + i * step, then their derivatives times the step."""
 
 
 @jit(allocates=False, forceinline=True)
@@ -36,11 +36,13 @@ def contact_modulus(shear_modulus, poisson_ratio):
 
 
 def _elliptic(flat):
-    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean. With c_n the
-    half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly equal numbers
-    where the ellipse is nearly a circle."""
+    """Return the elliptic integrals K, E/flat - K and K - E of the ellipse with (b/a)^2 = ``flat``.
+
+    The method is the arithmetic-geometric mean. With c_n the half differences of the means and S the sum of
+    2^(n-1) c_n^2, K - E = K S. This avoids the difference of two nearly equal numbers for an ellipse close to a
+    circle."""
     mean, other, total, weight = np.ones_like(flat), np.sqrt(flat), np.zeros_like(flat), 1.0
-    for _ in range(9):  # enough for a/b up to 1e13; the sixth is exact up to 1e3
+    for _ in range(9):  # sufficient for a/b up to 1e13; six are exact up to 1e3
         mean, other, difference = 0.5 * (mean + other), np.sqrt(mean * other), 0.5 * (mean - other)
         total += weight * difference * difference
         weight *= 2.0
@@ -50,9 +52,11 @@ def _elliptic(flat):
 
 
 def hertz_shape(ratio):
-    """Factors of the larger (along the smaller curvature) and smaller semi-axis and of the stiffness in the module's
-    formulas, exact, from the larger over the smaller relative curvature (array_like, 1 to 1e20): Johnson, Contact
-    Mechanics (1985), Eqs. (4.28)-(4.32), with Abramowitz and Stegun (1964), 17.6."""
+    """Return the factors of larger and smaller semi-axis and of the stiffness in the module's formulas, exactly.
+
+    ``ratio`` is the larger over the smaller relative curvature (array_like, 1 to 1e20). The larger semi-axis is in the
+    direction of the smaller curvature. Johnson, Contact Mechanics (1985), Eqs. (4.28)-(4.32), with Abramowitz and
+    Stegun (1964), 17.6."""
     ratio = np.asarray(ratio, float)
     low, high = np.zeros_like(ratio), np.full_like(ratio, 30.0)
     for _ in range(60):  # halves the range of ln(a/b)
@@ -71,7 +75,8 @@ def hertz_shape(ratio):
 
 @lru_cache(maxsize=1)
 def hertz_table():
-    """HertzTable of the shape functions: cubic Hermite nodes with slopes of the interpolating spline."""
+    """Return the `HertzTable` of the shape functions: cubic Hermite nodes with derivatives of the interpolating
+    spline."""
     log_ratio, step = np.linspace(0.0, LOG_RATIO_MAX, _NODES // 2 + 1, retstep=True)
     p_large, p_small, k = hertz_shape(np.exp(log_ratio))
     p, k = np.concatenate([p_small[:0:-1], p_large]), np.concatenate([k[:0:-1], k])
@@ -81,7 +86,7 @@ def hertz_table():
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def hertz_shape_at(table, A, B):
-    """`hertz_ellipse`, and ln(a/b)."""
+    """Return the three factors of `hertz_ellipse`, and ln(a/b), for relative curvatures A and B, 1/m."""
     total = A + B
     position = (math.log(B / A) + LOG_RATIO_MAX) * (1.0 / table.step)
     last = table.values.shape[0] - 1
@@ -102,19 +107,20 @@ def hertz_shape_at(table, A, B):
 
 @jit(allocates=False, fastmath=FUSED)
 def hertz_ellipse(table, A, B):
-    """Stiffness and semi-axis factors, all in sqrt(m), for relative curvatures A (rolling) and B (lateral), 1/m:
+    """Return stiffness and semi-axis factors, all in sqrt(m), for relative curvatures A (rolling), B (lateral), 1/m.
+
     N = E* stiffness delta^1.5, a = a_factor sqrt(delta), b = b_factor sqrt(delta)."""
     return hertz_shape_at(table, A, B)[:3]
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def damping_factor(approach_speed, c_e, v0):
-    """Damping factor c_d of Eq. (7) at an approach speed (m/s): c_e (0 to 1; 1: no damping) when separating, 1 when
-    approaching, a cubic in |speed| < v0 (m/s).
+    """Damping factor c_d of Eq. (7) at an approach speed (m/s).
 
-    C1 and never negative, so the normal force never pulls. At rest it is (1 + c_e)/2: the static penetration is larger
-    than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e). Ambrosio and Pombo,
-    Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020)."""
+    It is c_e (0 to 1; 1: no damping) in separation, 1 in approach, and a cubic for |speed| < v0 (m/s). It is C1 and
+    never negative, so that there is no tensile normal force. At rest it is (1 + c_e)/2: the static penetration is
+    larger than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e). Ambrosio and
+    Pombo, Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020)."""
     if approach_speed >= v0:
         return 1.0
     if approach_speed <= -v0:
@@ -125,7 +131,9 @@ def damping_factor(approach_speed, c_e, v0):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def inverse_cube_root(x):
-    """x^(-1/3) for 0 < x <= 1, to rounding: a parabola (3 % off from 0.2 on), then two steps of fourth order."""
+    """Return x^(-1/3) for 0 < x <= 1, with an error at the level of rounding.
+
+    From x = 0.2 on, a parabola with an error of 3 %, then two steps of fourth order."""
     if x == 1.0:
         return 1.0
     if x < 0.2:
@@ -139,13 +147,15 @@ def inverse_cube_root(x):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def loaded_ellipse(table, modulus, c_e, v0, penetration, A, B, approach_speed):
-    """Normal force (N) by Eq. (7), semi-axes (m) of the ellipse that carries it, their ratio a/b and its logarithm, for
-    relative curvatures A and B (1/m); ``c_e`` and ``v0`` of `damping_factor`."""
+    """Return the normal force (N) by Eq. (7), the semi-axes a, b (m) of its ellipse, a/b and ln(a/b).
+
+    ``A`` and ``B`` are relative curvatures (1/m), ``modulus`` is E* (Pa), ``penetration`` is in m, ``approach_speed``
+    in m/s; for ``c_e`` and ``v0`` see `damping_factor`."""
     stiffness, a, b, log_axis_ratio = hertz_shape_at(table, A, B)
     factor = damping_factor(approach_speed, c_e, v0)
     root = math.sqrt(penetration)
     force = factor * modulus * stiffness * penetration * root
-    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
+    # The ellipse is that of the damped force: its elastic approach is c_d^(2/3) delta.
     inverse = inverse_cube_root(factor)
     root *= factor * inverse * inverse
     return force, a * root, b * root, a / b, log_axis_ratio

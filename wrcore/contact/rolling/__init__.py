@@ -1,1 +1,1 @@
-"""Friction in a patch that rolls: by strips, and on ellipses."""
+"""Rolling friction in a contact patch: on strips of any patch, and on ellipses."""

@@ -6,17 +6,17 @@ that CONTACT solves). With panel forces F and bounds G this is the variational i
 
     find |F| <= G :   (A F + w) . (F' - F) >= 0   for all |F'| <= G,
 
-A from `operator`, w the rigid slip. It is solved by Douglas-Rachford splitting between the projection P on the
-disks and the resolvent of A, factorised once per patch:
+with A from `wrcore.contact.rolling.ellipse_influence` and the rigid slip w. It is solved by Douglas-Rachford splitting
+between the projection P on the disks and the resolvent of A, inverted once per patch:
 
     F = P(z),   y = M (2 F - z - (w + delta)/h),   z <- z + rho (y - F),   M = (H + A)^-1 H,
 
-which converges for every rho in (0, 2) because the symmetric part of A is positive definite. It starts where all panels
-stick, A F = -w, which is the solution but for the trailing edge where creepages are small; panels beyond their bound
-slide there, by their share of the rigid slip. It ends on a change relative to the traction. A panel's slip holds half
-a panel ahead of its load. That is second-order accurate where the panel sticks, but in sliding panels the direction of
-the traction must follow the slip at the load: delta carries the slip there (rigid part exactly, elastic part by
-differences along the strip) and lags one iteration behind.
+which converges for every rho in (0, 2) because the symmetric part of A is positive definite. The start is full
+adhesion, A F = -w, which for small creepages is the solution except at the trailing edge. Where it exceeds the bound,
+panels start with sliding. The iteration ends on a change relative to the traction. The slip of a panel is evaluated
+half a panel ahead of its load, which is second-order accurate in adhesion. In sliding panels the traction must oppose
+the slip at the load: delta is the change of slip from slip point to load point (rigid part exact, elastic part by
+differences in the strip), and lags one iteration behind.
 
 References
 ----------
@@ -51,7 +51,7 @@ _TINY = np.float32(1e-30)
 
 @jit
 def _project(z, bound, force, ramp):
-    """F = P(z): scale each two-vector (z_i, z_{i+N}) back to its disk; ramp from 0 (sticks) to 1 (slides fully)."""
+    """Fill F = P(z), with vectors (z_i, z_{i+N}) scaled back to their bounds, and ``ramp``: 0 adhesion, 1 sliding."""
     size = bound.size
     for i in range(size):
         ratio = np.sqrt(z[i] * z[i] + z[i + size] * z[i + size]) / bound[i]
@@ -63,8 +63,8 @@ def _project(z, bound, force, ramp):
 
 @jit
 def _start(op, creepage, slip, z):
-    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck. Where that is beyond
-    the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution."""
+    """Fill the rigid slip w = (xi - phi y, eta + phi x) at the slip points, and the start z from full adhesion. Let r
+    be bound over force. If r < 1, z is r times this force minus (1 - r) w/h: the solution for fast sliding."""
     xi, eta, phi = np.float32(creepage[0]), np.float32(creepage[1]), np.float32(creepage[2])
     stuck, size = op.stuck, op.bound.size
     for i in range(size):
@@ -79,7 +79,7 @@ def _start(op, creepage, slip, z):
 
 @jit
 def _slowed(creepage, slow):
-    """Copy a creepage, reduced to FAST if it is larger, and return the factor of the reduction."""
+    """Fill ``slow`` with a creepage, reduced to at most FAST; return the factor of the reduction."""
     factor = max(1.0, max(abs(creepage[0]), abs(creepage[1]), abs(creepage[2])) / FAST)
     for i in range(3):
         slow[i] = creepage[i] / factor
@@ -88,8 +88,8 @@ def _slowed(creepage, slow):
 
 @jit
 def _to_faster(op, creepage, factor, result):
-    """From the force at a reduced creepage to the force at ``factor`` times it. Where all panels slide fast, the force
-    approaches that of the rigid slip alone like 1/factor."""
+    """Convert ``result``, the force at a reduced creepage, to the force at ``factor`` times this creepage. In full
+    sliding the difference to the force of pure rigid slip decreases as 1/factor."""
     xi, eta, phi = creepage[0], creepage[1], creepage[2]
     fx = fy = mz = 0.0
     size = op.bound.size
@@ -106,7 +106,7 @@ def _to_faster(op, creepage, factor, result):
 
 @jit
 def _elastic_slip(step, force, z, delta, slip, elastic):
-    """Elastic part of the slip, -h (z - F) - delta - w, of one component; ``elastic`` has one ghost at either end."""
+    """Fill the elastic slip, -h (z - F) - delta - w, of one component; ``elastic`` has an extra point at either end."""
     for i in range(step.size):
         elastic[i + 1] = step[i] * (force[i] - z[i]) - delta[i] - slip[i]
 
@@ -121,14 +121,14 @@ def _shift_slip(ahead, behind, rigid, phi, ramp, relaxation, elastic, delta):
 
 @jit
 def _right_hand_side(inverse_step, force, z, slip, delta, rhs):
-    """2 F - z - (w + delta)/h of one component."""
+    """Fill ``rhs`` with 2 F - z - (w + delta)/h of one component."""
     for i in range(inverse_step.size):
         rhs[i] = _TWO * force[i] - z[i] - (slip[i] + delta[i]) * inverse_step[i]
 
 
 @jit
 def _before_resolvent(op, phi, count, z, slip, delta, force, rhs, ramp, elastic):
-    """Project one case, move its delta along, and form what the resolvent acts on."""
+    """Project one case, update its delta, and fill the right-hand side of the resolvent."""
     size = op.bound.size
     _project(z, op.bound, force, ramp)
     relaxation = np.float32(0.6) if count < 20 else np.float32(0.15)
@@ -143,7 +143,7 @@ def _before_resolvent(op, phi, count, z, slip, delta, force, rhs, ramp, elastic)
 
 @jit
 def _update(y, force, z):
-    """z += rho (y - F); returns the sum of abs(y - F) over that of abs(F)."""
+    """Add rho (y - F) to z; return the sum of abs(y - F) over that of abs(F)."""
     change, total = _ZERO, _TINY
     for j in range(z.size):
         move = y[j] - force[j]
@@ -155,7 +155,7 @@ def _update(y, force, z):
 
 @jit
 def _apply_resolvent(op, rows, half_rows, out_rows, out):
-    """out = M rows for each row (a case); by mirror halves where the operator is symmetric."""
+    """Fill ``out`` with M times each row (a case); for a symmetric operator, by its even and odd halves."""
     cases, size = rows.shape[0], op.bound.size
     if not op.symmetric:
         np.dot(rows, op.resolvent, out)
@@ -189,7 +189,7 @@ def _apply_resolvent(op, rows, half_rows, out_rows, out):
 
 @jit
 def _resultant(op, force, result):
-    """(fx, fy, mz) of panel forces, moment about the origin."""
+    """Fill ``result`` with fx, fy, mz of panel forces, moment about the origin."""
     size = op.bound.size
     fx = fy = mz = 0.0
     for i in range(size):
@@ -201,11 +201,11 @@ def _resultant(op, force, result):
 
 @jit
 def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterations, traction, slip_out):
-    """Solve for K rows of ``creepages`` (xi', eta', phi'): fills ``results`` (K, 3) with fx, fy, mz, ``iterations``
+    """Solve for K rows of ``creepages`` (xi', eta', phi'): fill ``results`` (K, 3) with fx, fy, mz, ``iterations``
     (K,), negative where the tolerance was not met, and, unless empty, panel forces and slip (K, 2 N).
 
-    The sum over panels of abs(y - F) has to fall below ``tolerance`` times that of abs(F). Up to ``batch`` cases are
-    iterated together so that the resolvent is a matrix product; one that has converged makes room for the next."""
+    A case ends when the sum over panels of abs(y - F) is at most ``tolerance`` times that of abs(F). Up to ``batch``
+    cases are iterated together, so that the resolvent is a matrix product; the next case replaces a converged one."""
     cases, size = creepages.shape[0], op.bound.size
     width = min(batch, cases)
     shape, half_shape = (width, 2 * size), (width, size)
@@ -263,7 +263,7 @@ class ContactField:
 
     x: np.ndarray
     y: np.ndarray
-    """(N,): load points of the panels over c."""
+    """(N,): positions of the load of the panels, over c."""
     x_edges: np.ndarray
     y_edges: np.ndarray
     """(ny, n + 1) and (ny + 1,): outlines of the panels over c."""
@@ -286,10 +286,10 @@ Tolerance = Annotated[float, ABOVE_ZERO]
 
 
 class RollingContact:
-    """A patch discretised and factorised once, ready for any number of creepages.
+    """Steady rolling contact of one patch, discretised once for any number of creepages.
 
-    Creepages and forces are nondimensional: xi' = xi G c^2/(mu N), eta' the same, phi' = phi G c^3/(mu N) with
-    c = sqrt(a b); fx = Fx/(mu N), fy, mz = Mz/(mu N c).
+    Creepages and forces are nondimensional: xi' = xi G c^2/(mu N), eta' = eta G c^2/(mu N), phi' = phi G c^3/(mu N)
+    with c = sqrt(a b); fx = Fx/(mu N), fy = Fy/(mu N), mz = Mz/(mu N c).
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ class RollingContact:
 
     @checked
     def solve(self, xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, tolerance: Tolerance = TOLERANCE):
-        """Creep forces of one case or of arrays of cases.
+        """Return the creep forces of one case or of arrays of cases.
 
         Parameters
         ----------
@@ -356,14 +356,14 @@ class RollingContact:
         return results, iterations
 
     def linear_response(self):
-        """Derivatives of (fx, fy, mz) by (xi', eta', phi') at zero creepage, adhesion everywhere: (3, 3) ndarray.
+        """Derivatives of fx, fy, mz with respect to xi', eta', phi' at zero creepage, full adhesion: (3, 3) ndarray.
 
         Row i belongs to output i. For the ellipse this is Kalker's matrix at this refinement."""
         return resultants(self.operator, self.operator.stuck).T.astype(float)
 
     @checked
     def field(self, xi: float, eta: float, phi: float, tolerance: Tolerance = TOLERANCE / 10):
-        """Traction and slip over the patch for one case.
+        """Compute traction and slip over the patch for one case.
 
         Returns
         -------
@@ -382,7 +382,7 @@ def _rows(xi, eta, phi):
 
 
 def _field(contact, force, slip, result):
-    """Divide panel forces by panel areas and lay out the outlines."""
+    """Return the `ContactField` of panel forces: tractions by panel areas, and outlines of the panels."""
     op, n, ny = contact.operator, contact.n, contact.ny
     size = n * ny
     y_edges = np.linspace(-1, 1, ny + 1) / np.sqrt(contact.g)

@@ -1,14 +1,13 @@
-"""Discretised half-space of one contact patch: panels, influence matrix, prefactored resolvent.
+"""Discretisation of one contact patch on the half-space: panels, influence matrix, inverted resolvent.
 
 All lengths are divided by c = sqrt(a b), tractions multiplied by c^2/(mu N), so that only the axis ratio g = a/b, the
 shape number psi and Poisson's ratio nu remain. The patch (simple double ellipse, SDEC) spans -1/sqrt(g) < y < 1/sqrt(g)
 and, with t = y - y0, y0 = -psi/sqrt(g), |x| < xl(y) = sqrt(g) sqrt(1 - g t^2/(1 +- psi)^2) for +-t > 0. psi = 0 is the
 ellipse. The bound of the traction is ``3/(2 pi sqrt(g)) sqrt(xl^2 - x^2)``.
 
-Discretisation: ``ny`` equal strips across, each with ``n`` panels along x whose edges are spaced like cosines and which
-follow the strip's own length. Unknown is the force of a panel, whose bound is known exactly. A strip carries its load
-on three sub-strips in proportion to their share of the normal load; the slip of a panel is averaged over their lines
-with the same weights.
+Discretisation: ``ny`` equal strips across, each with ``n`` panels along x with cosine spacing over the strip's length.
+The unknown is the force of a panel, whose bound is known exactly. A strip carries its load on three sub-strips in
+proportion to their normal load. The slip of a panel is the mean over their lines with the same weights.
 
 References
 ----------
@@ -28,38 +27,38 @@ SUB_STRIPS = 3
 STEP_SCALE = 2.5
 
 _LEAD = 0.5
-"""How far the first slip point lies from the edge, over the second: equally far, or on the edge, C23 errs by 0.5 % at
-level 22, so by 0.3 %."""
+"""Distance of the first slip point from the leading edge over that of the second. With 0.5, C23 has an error of 0.3 %
+at level 22; with 1 or 0, of 0.5 %."""
 
 
 class PatchPanels(NamedTuple):
-    """Geometry of the panels of one patch (lengths over c, forces over mu N); strip-major order, N = ny n panels."""
+    """Geometry of the N = ny n panels of one patch, strip by strip; lengths over c, forces over mu N."""
 
     n: int
     ny: int
-    """Panels per strip (from the leading edge backwards), strips (towards +y)."""
+    """Numbers of panels per strip (from the leading edge backwards) and of strips (towards +y)."""
     y_edge: np.ndarray
     """(3 ny + 1,): edges of the sub-strips."""
     half_length: np.ndarray
     y_line: np.ndarray
     share: np.ndarray
-    """(3 ny,): half length, load centroid and share in the strip's load of each sub-strip."""
+    """(3 ny,): half length, load centroid and fraction of the strip's load of each sub-strip."""
     bound: np.ndarray
-    """(N,): largest force of a panel; sums to 1."""
+    """(N,): maximum force of a panel; the sum is 1."""
     x_slip: np.ndarray
     x_force: np.ndarray
     y: np.ndarray
-    """(N,): where the slip row holds, centroid of the bound, lateral position."""
+    """(N,): x of the slip point, x of the centroid of the bound, lateral position."""
     along: Panels
-    """Of one strip."""
+    """Panels of one strip, over its half length."""
 
 
 class Operator(NamedTuple):
-    """What the iteration of `halfspace` needs, in float32; a kernel argument.
+    """Data of the iteration in `wrcore.contact.rolling.ellipse`, in float32; a kernel argument.
 
     ``resolvent`` and ``resolvent_odd`` hold transposed blocks of ``M = (H + A)^-1 H``. For psi = 0 the mirror
     symmetry y -> -y splits M: ``resolvent`` acts on (Fx even, Fy odd) and ``resolvent_odd`` on (Fx odd, Fy even) in y.
-    Otherwise ``resolvent`` is the whole of M and ``resolvent_odd`` is empty. ``stuck`` is that of `stuck_forces`."""
+    Otherwise ``resolvent`` is all of M and ``resolvent_odd`` is empty. ``stuck``: see `stuck_forces`."""
 
     n: int
     ny: int
@@ -79,15 +78,16 @@ class Operator(NamedTuple):
 
 
 def panel_counts(g, level):
-    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all. The ratio of the
-    two counts was chosen for least force error at a given total."""
+    """Numbers of panels per strip and of strips (even) for the axis ratio ``g``, about ``level**2`` panels in all.
+
+    The ratio of the two numbers was chosen for the minimum force error at a given total."""
     ratio = np.exp(np.interp(np.log(g), np.log([0.18, 0.5, 1.0, 2.5, 7.0]), np.log([2.0, 1.15, 0.8, 0.65, 0.7])))
     ny = max(4, 2 * round(level * np.sqrt(ratio) / 2))
     return max(4, round(level**2 / ny)), ny
 
 
 def _moments_of_squared_length(y0, y1, g, psi):
-    """Integrals of xl^2 and of y xl^2 from y0 to y1 on one half ellipse, or across y = -psi/sqrt(g)."""
+    """Integrals of xl^2 and of y xl^2 from y0 to y1, on one half ellipse or on both sides of y = -psi/sqrt(g)."""
     b = 1 / np.sqrt(g)
     middle = -psi * b
     zeroth = first = 0.0
@@ -101,7 +101,7 @@ def _moments_of_squared_length(y0, y1, g, psi):
 
 
 def patch_panels(g, psi, n, ny):
-    """Lay out ``ny`` strips of ``n`` panels on the patch of g = a/b and shape number psi, abs(psi) < 1."""
+    """Return `PatchPanels`: ``ny`` strips of ``n`` panels on the patch of g = a/b, shape number psi, abs(psi) < 1."""
     edges = np.linspace(-1, 1, SUB_STRIPS * ny + 1) / np.sqrt(g)
     moments = np.array([_moments_of_squared_length(*pair, g, psi) for pair in zip(edges[:-1], edges[1:], strict=True)])
     load = 0.75 / np.sqrt(g) * moments[:, 0]
@@ -122,7 +122,7 @@ def patch_panels(g, psi, n, ny):
 
 @jit
 def _displacement_row(dx0, half_length, cosines, y_far, y_near, nu, out):
-    """Displacements (uxx, uyy, uxy) at one point by unit forces on each panel of one sub-strip.
+    """Fill ``out`` with displacements (uxx, uyy, uxy) at one point by unit forces on each panel of one sub-strip.
 
     The panel has x edges ``half_length cosines`` and lies between y_far and y_near (both relative to the point, the
     first one larger); dx0 is the point's x. With u = 1/pi int K tau and
@@ -155,7 +155,7 @@ def _displacement_row(dx0, half_length, cosines, y_far, y_near, nu, out):
 
 @jit
 def _slip_matrix(panels, nu, rows):
-    """Slip by unit panel forces for the first ``rows`` strips: (rows n, N, 3) with components xx, yy, xy."""
+    """Slip in the first ``rows`` strips by unit panel forces: (rows n, N, 3) with components xx, yy, xy."""
     n, ny, points = panels.n, panels.ny, panels.along.points
     matrix = np.zeros((rows * n, ny * n, 3))
     now, last = np.empty((n, 3)), np.empty((n, 3))
@@ -179,14 +179,15 @@ def _slip_matrix(panels, nu, rows):
 
 
 def slip_matrix(panels, nu, rows=None):
-    """Slip at the panels of the first ``rows`` strips by unit forces, s = w - du/dx with w = 0: axx, ayy and axy (rows
-    n, N), the last one both the x slip by forces in y and the y slip by forces in x."""
+    """Slip at the panels of the first ``rows`` strips by unit forces, s = w - du/dx with w = 0.
+
+    Returns axx, ayy and axy, each (rows n, N). axy is both the x slip by forces in y and the y slip by forces in x."""
     return tuple(np.moveaxis(_slip_matrix(panels, float(nu), rows or panels.ny), 2, 0))
 
 
 def _resolvent(block, step):
-    """Transposed ``(H + A)^-1 H = (I + H^-1 A)^-1`` in float32."""
-    from scipy.linalg import get_lapack_funcs  # a tenth of a second that a table on disk need not wait
+    """Return the transpose of ``(H + A)^-1 H = (I + H^-1 A)^-1`` in float32."""
+    from scipy.linalg import get_lapack_funcs  # takes 0.1 s; imported here, as a table on disk does not need it
 
     matrix = block / np.concatenate([step, step])[:, None]
     matrix[np.diag_indices_from(matrix)] += 1
@@ -198,15 +199,17 @@ def _resolvent(block, step):
 
 
 def _mirrored(block, n):
-    """Split columns into (y < 0 half, y > 0 half in mirrored strip order)."""
+    """Split columns into those of y < 0, and those of y > 0 with their strips in mirrored order."""
     half = block.shape[1] // 2
     other = block[:, half:].reshape(block.shape[0], -1, n)[:, ::-1].reshape(block.shape[0], -1)
     return block[:, :half], other
 
 
 def stuck_forces(panels, nu, symmetric, precision=np.float64):
-    """A, or for psi = 0 (``symmetric``) its blocks on (Fx even, Fy odd) and (Fx odd, Fy even) in y, and the panel
-    forces (3, 2 N) by unit xi', eta', phi' where all panels stick, A F = -w."""
+    """Return the influence matrix A in blocks, and the panel forces (3, 2 N) by unit xi', eta', phi' in full adhesion.
+
+    For psi = 0 (``symmetric``) there are two blocks, on (Fx even, Fy odd) and (Fx odd, Fy even) in y. Otherwise there
+    is one. In full adhesion A F = -w."""
     n, rows = panels.n, panels.ny // 2 if symmetric else panels.ny
     size = rows * n
     zero, one, spin = np.zeros(size), np.ones(size), (-panels.y[:size], panels.x_slip[:size])
@@ -228,14 +231,15 @@ def stuck_forces(panels, nu, symmetric, precision=np.float64):
 
 
 def resultants(panels, force):
-    """(fx, fy, mz), last axis, of panel forces (..., 2 N); ``panels`` may be an `Operator`."""
+    """Resultants fx, fy, mz (last axis) of panel forces (..., 2 N); ``panels`` may be an `Operator`."""
     fx, fy = np.split(force, 2, axis=-1)
     return np.stack([fx.sum(axis=-1), fy.sum(axis=-1), fy @ panels.x_force - fx @ panels.y], axis=-1)
 
 
 def make_operator(g, psi, nu, n, ny):
-    """Discretise and factorise the patch of g = a/b, shape number psi and Poisson's ratio nu, with n panels on each of
-    an even number ny of strips."""
+    """Return the `Operator` of the patch of g = a/b, shape number psi and Poisson's ratio nu.
+
+    The patch has an even number ``ny`` of strips with ``n`` panels each."""
     panels = patch_panels(g, psi, n, ny)
     symmetric = psi == 0
     blocks, stuck = stuck_forces(panels, nu, symmetric, np.float32)

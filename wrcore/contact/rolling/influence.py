@@ -1,7 +1,7 @@
-"""Influence of tangential loads between strips along the rolling direction: slip by unit panel forces.
+"""Influence of tangential loads between strips in the rolling direction: slip by unit panel forces.
 
-A strip is as wide as given and reaches from X - a to X + a along x; its n panels have edges X + a cos(k pi/n). Loads
-are constant over a panel, displacements are wanted on one line per strip (y), at points X + a cos((k - 1/2) pi/n) and
+A strip has a given width and reaches from X - a to X + a along x; its n panels have edges X + a cos(k pi/n). Loads are
+constant over a panel. Displacements are evaluated on one line per strip (y), at points X + a cos((k - 1/2) pi/n) and
 one point ahead of the leading edge. With u = 1/(pi G) int K tau dA (two equal half-spaces),
 
     Kxx = 1/R - nu y^2/R^3,   Kyy = 1/R - nu x^2/R^3,   Kxy = nu x y/R^3,
@@ -32,35 +32,35 @@ from wrcore.kernels.jit import FUSED, jit
 
 _STEP_SCALE, _UNIT, _ZERO = np.float32(2), np.float32(1), np.float32(0)
 _ROOT_HALF = 0x3F3504F3
-"""Bits of sqrt(1/2)."""
+"""Binary representation of sqrt(1/2) as float32."""
 
 _SERIES = tuple(np.float32(2 / k) for k in (1, 3, 5, 7))
-"""Of ln((1 + s)/(1 - s)) over odd powers of s: within 1e-8 for the mantissas between sqrt(1/2) and sqrt(2)."""
+"""Coefficients of ln((1 + s)/(1 - s)) over odd powers of s; error 1e-8 for mantissas from sqrt(1/2) to sqrt(2)."""
 
 _LN2, _LEAST = np.float32(np.log(2.0)), np.float32(1e-30)
 
 
 class StripLayout(NamedTuple):
-    """Strips of a patch and what they transmit, (M,) each; lengths over c."""
+    """Strips of a patch and forces on them, (M,) each; lengths over c."""
 
     half: np.ndarray
     middle: np.ndarray
     line: np.ndarray
     centre: np.ndarray
     width: np.ndarray
-    """Half length and middle along x; line of the load, centre and width across."""
+    """Half length and middle along x; lateral position of the load, centre and width across."""
     share: np.ndarray
     density: np.ndarray
-    """Share in the patch's load; peak times half length."""
+    """Fraction of the patch's load; peak pressure times half length."""
     force_x: np.ndarray
     force_s: np.ndarray
     turn: np.ndarray
-    """Forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c."""
+    """Forces along x and s over mu N, and the moment of the second about the strip's middle over mu N c."""
 
 
 @intrinsic
 def _exponent(_, x):
-    """The e of x = m 2^e, m from sqrt(1/2) to sqrt(2), for a positive normal number."""
+    """Exponent e of x = m 2^e, with m from sqrt(1/2) to sqrt(2), of a positive normal number."""
 
     def generate(_, builder, __, arguments):
         return builder.sitofp(_shifted(builder, arguments[0])[1], ir.FloatType())
@@ -70,7 +70,7 @@ def _exponent(_, x):
 
 @intrinsic
 def _mantissa(_, x):
-    """The m of x = m 2^e."""
+    """Mantissa m of x = m 2^e, see `_exponent`."""
 
     def generate(_, builder, __, arguments):
         bits, exponent = _shifted(builder, arguments[0])
@@ -80,7 +80,7 @@ def _mantissa(_, x):
 
 
 def _shifted(builder, x):
-    """Bits of a number, and the whole number e."""
+    """Return the binary representation of a number and its exponent e, both as integers."""
     word = ir.IntType(32)
     bits = builder.bitcast(x, word)
     return bits, builder.ashr(builder.sub(bits, word(_ROOT_HALF)), word(23))
@@ -88,7 +88,7 @@ def _shifted(builder, x):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _log(x):
-    """Logarithm of a positive normal float32 to its precision, without branches: a loop over it becomes vector code."""
+    """Logarithm of a positive normal float32 to its precision, without branches, so that loops are vectorised."""
     m = _mantissa(x)
     s = (m - _UNIT) / (m + _UNIT)
     q = s * s
@@ -119,7 +119,9 @@ def _add_strip(dx, d, width, weight, nu, gxx, gyy, gxy):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_strip_exactly(dx, far, near, nu, gxx, gyy, gxy):
-    """The same in closed form for a strip from ``near`` to ``far`` (the larger one) that may hold the line.
+    """Add the integrals of `_add_strip` in closed form, for a strip from ``near`` to ``far`` (> ``near``).
+
+    The strip may contain the line of the points, at 0.
 
     Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R."""
     y_far, y_near, share = np.float32(far), np.float32(near), np.float32(1.0 / (far - near))
@@ -144,7 +146,9 @@ def _add_strip_exactly(dx, far, near, nu, gxx, gyy, gxy):
 
 @jit(allocates=False, fastmath=FUSED)
 def _difference(g, scale, factor, out):
-    """Second difference over points and edges of ``g``, in rows of points; ``out`` is as wide, its last column void."""
+    """Fill ``out`` with the second differences of ``g`` over points and edges, by rows of points.
+
+    ``out`` has the row length of ``g``; its last column is unused."""
     size, factor = scale.size, np.float32(factor)
     after, below, beyond = g[1 : size + 1], g[g.size - size - 1 :], g[g.size - size :]
     for i in range(size):
@@ -153,14 +157,14 @@ def _difference(g, scale, factor, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def _copy_scaled(source, factor, out):
-    """out = factor source."""
+    """Fill ``out`` with ``factor`` times ``source``."""
     for i in range(out.size):
         out[i] = factor * source[i]
 
 
 @jit(allocates=False, fastmath=FUSED)
 def second_window(centre, width):
-    """Index of the first strip behind a gap, or the number of strips."""
+    """Return the index of the first strip after a lateral gap, or the number of strips."""
     for j in range(1, centre.size):
         if centre[j] - centre[j - 1] > 0.500001 * (width[j] + width[j - 1]):
             return j
@@ -169,8 +173,10 @@ def second_window(centre, width):
 
 @jit(allocates=False, fastmath=FUSED)
 def _shift_at_tip(here, inner, ratio):
-    """How far the load's centroid in the strip at a tip lies inside its middle, over its width: a parabola through the
-    loads per width of this strip and the next, ``ratio`` times as wide, that is zero at the tip: exact for ellipses."""
+    """Distance of the load's centroid inwards from the middle of the strip at a tip, over its width.
+
+    The load per width is a parabola through this strip and the next, ``ratio`` times as wide, that is 0 at the tip.
+    This is exact for ellipses."""
     bend = 3.0 * (inner - (2.0 + ratio) * here) / (1.0 + ratio) ** 2
     slope = 2.0 * here - bend * (2 / 3)
     return (slope / 3 + bend / 4) / here - 0.5
@@ -178,7 +184,8 @@ def _shift_at_tip(here, inner, ratio):
 
 @jit(allocates=False, fastmath=FUSED)
 def _centroid_shift(strip, j, first, last):
-    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola)."""
+    """Distance of the load's centroid from the strip's centre, over its width, from a parabola through the loads per
+    width of three strips."""
     if first and last:
         return 0.0
     here = max(strip.density[j], 1e-30)
@@ -194,7 +201,9 @@ def _centroid_shift(strip, j, first, last):
 
 @jit(allocates=False, fastmath=FUSED)
 def lay_out(centre, width, half_length, middle, peak, split, strip):
-    """Scale the strips by c, c^2 = sum of half length times width/2, and place their lines; returns c and the load."""
+    """Fill ``strip`` with the strips over c, c^2 = sum of half length times width/2, and the positions of their loads.
+
+    Returns c (m) and the load (N)."""
     count = centre.size
     area = load = longest = 0.0
     for j in range(count):
@@ -215,7 +224,7 @@ def lay_out(centre, width, half_length, middle, peak, split, strip):
 
 @jit(allocates=False, fastmath=FUSED)
 def _distances(panels, point_strip, load_strip, strip, dx):
-    """x of all edges of one strip relative to all points of another."""
+    """Fill ``dx`` with x of all edges of one strip relative to all points of another."""
     n = panels.n
     for m in range(n + 1):
         x = strip.middle[point_strip] + strip.half[point_strip] * panels.points[m]
@@ -225,7 +234,7 @@ def _distances(panels, point_strip, load_strip, strip, dx):
 
 @jit(allocates=False, fastmath=FUSED)
 def _corners(panels, i, j, nu, work):
-    """The three integrals at all pairs of points of strip i and edges of strip j."""
+    """Fill ``work.corner`` with the three integrals at all pairs of points of strip i and edges of strip j."""
     strip = work.strip
     dx, gxx, gyy, gxy = work.corner[0], work.corner[1], work.corner[2], work.corner[3]
     _distances(panels, i, j, strip, dx)
@@ -245,7 +254,7 @@ def _corners(panels, i, j, nu, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _block(panels, i, j, work, matrix):
-    """Write the slip of strip i by strip j, over the step."""
+    """Write the slip of strip i by unit forces on strip j, divided by the step h, into ``matrix``."""
     n = panels.n
     row, column = 2 * n * i, 2 * n * j
     factor = 1.0 / (np.pi * work.strip.half[i] * work.strip.half[j])
@@ -263,7 +272,7 @@ def _block(panels, i, j, work, matrix):
 
 @jit(allocates=False, fastmath=FUSED)
 def assemble(panels, count, nu, work):
-    """B = H^-1 A of ``count`` strips in the workspace; h = 2 sqrt(Axx Ayy) from the diagonals."""
+    """Fill ``work.matrix`` with B = H^-1 A of ``count`` strips; h = 2 sqrt(Axx Ayy) from the diagonals."""
     n = panels.n
     size = 2 * n * count
     matrix = work.matrix[: size * size].reshape((size, size))

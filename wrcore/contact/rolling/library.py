@@ -1,4 +1,4 @@
-"""Library of resolvents, ellipses over ln(a/b), for similar patches (see `rolling`)."""
+"""Library of resolvents of ellipses over ln(a/b), for patches of similar shape (see `rolling`)."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,22 +16,23 @@ LOG_MIN, LOG_STEP = -2.4, 0.4
 
 
 class Library(NamedTuple):
-    """Resolution, Poisson's ratio, and resolvents of ellipses; a kernel argument, never written to."""
+    """Resolution, Poisson's ratio, and resolvents of ellipses; a read-only kernel argument."""
 
     level: Level
     panels: Panels
     nu: float
     log_min: float
     log_step: float
-    """First value of ln(a/b), and distance of the values."""
+    """Step of the values of ln(a/b); ``log_min`` is the first value."""
     resolvents: np.ndarray
     """(K, m m) float32: ``(I + B)^-1`` row by row, m = 2 n strips; unknowns in the order of `rolling.RollingWork`."""
 
 
 def ellipse_strips(a, b, count):
-    """Equal strips, as `rolling.rolling_force` takes them, on an ellipse (semi-axes a along rolling, b across, m) under
-    Hertz's pressure of peak 1: half lengths are root mean squares over a strip's width; with peaks in proportion the
-    load is exact."""
+    """Return ``count`` equal strips for `rolling.rolling_force` on an ellipse under Hertz's pressure with maximum 1.
+
+    ``a`` and ``b`` are the semi-axes in the rolling direction and across, m. Half lengths are root mean squares over a
+    strip's width; peak pressures are in proportion, so that the load is exact."""
     edge = np.linspace(-1, 1, count + 1)
     root = np.sqrt(1 - np.diff(edge**3) / (3 * np.diff(edge)))
     return (edge[1:] + edge[:-1]) / 2 * b, np.diff(edge) * b, a * root, np.zeros(count), root
@@ -39,7 +40,7 @@ def ellipse_strips(a, b, count):
 
 @jit(allocates=False, fastmath=FUSED)
 def _invert(block, work, resolvent):
-    """(I + B)^-1 of the matrix in the workspace."""
+    """Fill ``resolvent`` with (I + B)^-1, for the matrix B in ``work``."""
     size = resolvent.shape[0]
     factors = work.factors.reshape((size, size))
     factorise(work.matrix.reshape((size, size)), block, size // block, factors)
@@ -54,8 +55,9 @@ def _invert(block, work, resolvent):
 
 @lru_cache(maxsize=16)
 def make_library(level="middle", nu=0.28):
-    """`Library` of a level, by its name in `rolling.LEVELS` or as `Level`; built in 10 to 100 ms and kept. InputError
-    for panels that are odd or too few."""
+    """Return the `Library` of a level, given by its name in `rolling.LEVELS` or as `Level`.
+
+    It is built in 10 to 100 ms and cached. InputError if the number of panels is odd or too small."""
     level = LEVELS[level] if isinstance(level, str) else level
     if level.panels < 4 or level.panels % 2 or level.strips < 2:
         raise InputError("rolling contact", "level", f"expected an even number of panels above 2, got {level}")

@@ -1,4 +1,4 @@
-"""Panels along a strip of contact, as both half-space solvers lay them out: ellipses and strips of any patch."""
+"""Panels of a strip of contact in the rolling direction, for both half-space solvers (ellipses, patches on strips)."""
 
 from typing import NamedTuple
 
@@ -8,28 +8,31 @@ UPWIND = 0.6
 
 
 class Panels(NamedTuple):
-    """Panels along a strip, from the leading edge backwards, over its half length and load: what depends on their
-    number alone; a kernel argument."""
+    """Panels of a strip, from the leading edge backwards, over its half length and load; a kernel argument.
+
+    They depend only on the number of panels."""
 
     n: int
     edges: np.ndarray
     points: np.ndarray
-    """(n + 1,): edges of the panels; points between which slip is a difference (the first lies ahead of the strip)."""
+    """(n + 1,): edges of the panels; points whose difference of displacement is the slip (first one ahead of the
+    strip)."""
     share: np.ndarray
     load: np.ndarray
     slip: np.ndarray
-    """(n,): share of the panel in the strip's normal load, centroid of that load, and where the slip row holds."""
+    """(n,): fraction of the strip's normal load on the panel, centroid of this load, and slip point of the panel."""
     scale: np.ndarray
-    """(n (n + 1) - 1,) float32: reciprocals of distances between points times widths of panels, in rows of points with
-    one void between."""
+    """(n (n + 1) - 1,) float32: 1 / (distance of two points times width of a panel), by rows of points, with one unused
+    number after each row."""
     ahead: np.ndarray
     behind: np.ndarray
-    """(n,): weights that carry elastic slip from ``slip`` to ``load``."""
+    """(n,): weights of differences that extrapolate elastic slip from ``slip`` to ``load``."""
 
 
 def make_panels(n, lead=1.0):
-    """Lay out ``n`` >= 3 panels with cosine spacing on a strip with semi-elliptic pressure; the first point lies
-    ``lead`` times as far ahead of the edge as the second lies behind it."""
+    """Return ``n`` >= 3 panels with cosine spacing on a strip with semi-elliptic pressure.
+
+    The first point is ahead of the leading edge, by ``lead`` times the distance of the second one behind it."""
     theta = np.pi * np.arange(n + 1) / n
     share = np.diff(theta / 2 - np.sin(2 * theta) / 4) / (np.pi / 2)
     load = np.diff(np.sin(theta) ** 3 / 3) / (np.pi / 2) / share

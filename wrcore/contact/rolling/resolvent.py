@@ -1,22 +1,25 @@
-"""Resolvents of strips: from a library of ellipses, or from the triangular factors of a band (see `rolling`)."""
+"""Resolvents of patches on strips: from a library of ellipses, or from triangular factors of a band (see `rolling`)."""
 
 import numpy as np
 
 from wrcore.kernels.jit import FAST, FUSED, jit
 
 LONGEST_PANEL = 5.0
-"""Panels longer than so many widths of a strip: no ellipse of the library is similar enough for convergence."""
+"""Length of panels over the width of a strip above which no ellipse of the library is similar enough for
+convergence."""
 
 LEAST_ALIKE = 0.6
-"""The same for a/b times the distance from an ellipse, see `_shape`."""
+"""Product of a/b and the distance from an ellipse (see `_shape`) above which no ellipse of the library is similar
+enough."""
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
 @jit(allocates=False, fastmath=FAST)
 def multiply(matrix, x, y, count, first):
-    """y = matrix x for ``count`` rows of x and y, of which the columns from ``first`` on take part; four rows of the
-    matrix by two of x at a time."""
+    """Fill y = matrix x for ``count`` rows of x and y, in their columns from ``first`` on.
+
+    Four rows of the matrix and two rows of x are processed at a time."""
     size = matrix.shape[0]
     last = size - size % 4
     for i in range(0, last, 4):
@@ -55,14 +58,14 @@ def multiply(matrix, x, y, count, first):
 
 @jit(allocates=False, fastmath=FUSED)
 def _subtract(row, factor, pivot):
-    """row -= factor pivot."""
+    """Subtract ``factor`` times ``pivot`` from ``row``."""
     for j in range(row.size):
         row[j] -= factor * pivot[j]
 
 
 @jit(allocates=False, fastmath=FAST)
 def _dot(one, two):
-    """Scalar product."""
+    """Scalar product of two vectors."""
     total = _ZERO
     for j in range(one.size):
         total += one[j] * two[j]
@@ -71,7 +74,9 @@ def _dot(one, two):
 
 @jit(allocates=False, fastmath=FUSED)
 def _eliminate(row, one, two, three, four):
-    """Subtract four pivot rows from a row, all beginning with the first pivot; its first four become the factors."""
+    """Subtract multiples of four pivot rows from a row; its first four numbers become the factors.
+
+    All rows begin at the column of the first pivot."""
     a = row[0] * one[0]
     b = (row[1] - a * one[1]) * two[1]
     c = (row[2] - a * one[2] - b * two[2]) * three[2]
@@ -83,7 +88,9 @@ def _eliminate(row, one, two, three, four):
 
 @jit(allocates=False, fastmath=FUSED)
 def factorise(matrix, block, reach, factors):
-    """Triangular factors of I + B without the strips farther apart than ``reach``; inverses on the diagonal.
+    """Fill the triangular factors of I + B, without pairs of strips farther apart than ``reach``.
+
+    The diagonal contains the inverses of the pivots.
 
     ``block`` is the number of unknowns of a strip, a multiple of 4. No pivots: the symmetric part of H + A is
     positive definite."""
@@ -108,7 +115,7 @@ def factorise(matrix, block, reach, factors):
 
 @jit(allocates=False, fastmath=FAST)
 def substitute(factors, block, reach, r, y):
-    """y = (L U)^-1 r."""
+    """Fill y = (L U)^-1 r by forward and back substitution."""
     size = r.size
     for i in range(size):
         first = max(i // block - reach, 0) * block
@@ -120,7 +127,9 @@ def substitute(factors, block, reach, r, y):
 
 @jit(allocates=False, fastmath=FAST)
 def _blend(library, log_ratio, out):
-    """Resolvent between two of the library's, linear in ln(a/b): it need only be similar to the patch's."""
+    """Fill ``out`` with a resolvent interpolated linearly in ln(a/b) between two of the library.
+
+    This is accurate enough, because the resolvent must only be similar to that of the patch."""
     place = (log_ratio - library.log_min) / library.log_step
     place = min(max(place, 0.0), library.resolvents.shape[0] - 1.000001)
     k = int(place)
@@ -131,9 +140,10 @@ def _blend(library, log_ratio, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def _shape(first, last, strip):
-    """a/b of the ellipse as wide as some strips with their mean square of the lengths, and how far they are from it.
+    """Return a/b of the ellipse with the width and mean square length of some strips, and their distance from it.
 
-    The latter: standard deviation of the middles over a, and eccentricity of the load over b. Means by load."""
+    The distance combines the standard deviation of the middles over a and the eccentricity of the load over b. All
+    means are weighted with the load."""
     low = strip.centre[first] - 0.5 * strip.width[first]
     b = 0.5 * (strip.centre[last - 1] + 0.5 * strip.width[last - 1] - low)
     load = square = x = xx = s = 0.0
@@ -151,7 +161,7 @@ def _shape(first, last, strip):
 
 @jit(allocates=False, fastmath=FUSED)
 def take_from_library(library, count, windows, split, work):
-    """Put the resolvents of similar ellipses in the workspace; False if a window has none."""
+    """Write the resolvents of similar ellipses to ``work.factors``; return False if a window has none."""
     strips, panels = library.level.strips, library.panels
     if count != windows * strips or (windows == 2 and split != strips):
         return False

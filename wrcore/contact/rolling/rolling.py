@@ -1,20 +1,20 @@
-"""Steady rolling of an arbitrary contact patch that is given as strips along the rolling direction.
+"""Steady rolling of a contact patch of any shape that is given as strips along the rolling direction.
 
 Coulomb friction, equal materials, half-space; pressure given, in each strip p = peak sqrt(1 - ((x - middle)/a)^2). In
-each panel of a strip (see `influence`) either the slip vanishes and the traction is below its bound or the traction
-is at the bound and opposes the slip. With panel forces F, their bounds and the rigid slip w this is the variational
-inequality of `wrcore.contact.rolling.ellipse`, solved like there by Douglas-Rachford splitting,
+each panel of a strip (see `influence`) either the slip is 0 and the traction is below its bound, or the traction is at
+the bound and opposes the slip. With panel forces F, their bounds and the rigid slip w this is the variational
+inequality of `wrcore.contact.rolling.ellipse`. It is also solved by Douglas-Rachford splitting,
 
     F = P(z),   bracket = 2 F - z - (w + delta)/h,   y = (I + B)^-1 bracket,   z <- z + rho (y - F),   B = H^-1 A,
 
-delta carrying the slip of sliding panels to their load. A patch in a simulation has a new shape each time; so the
-resolvent is not its own. M of a similar shape (an ellipse from a library, see `library`, one for each of two lobes;
-or I + B with the strips that are far apart left out) takes its place and the rest lags one iteration behind,
+where delta is the change of slip from a sliding panel's slip point to its load point. In a simulation each patch has a
+new shape, and inverting I + B would be slow. M is the inverse for a similar shape: an ellipse from a library (see
+`library`), one for each of two sub-patches; or I + B without distant strips. The difference lags one iteration behind,
 
     r <- bracket - B y + (r - y),   y = M r,
 
-where r - y = (M^-1 - I) y. The fixed point is that of B whatever M. The number of iterations is fixed, for the
-result to be a smooth function of the inputs; it does not depend on earlier calls.
+where r - y = (M^-1 - I) y. The fixed point depends on B, not on M. The number of iterations is fixed, so that the
+result is a smooth function of the inputs; it does not depend on earlier calls.
 
 References
 ----------
@@ -32,10 +32,10 @@ from wrcore.kernels.jit import FUSED, jit
 
 AUTO, LIBRARY, BAND, DIRECT = range(4)
 FASTEST = 100.0
-"""Largest rigid slip that is iterated, over mu N/(G c^2)."""
+"""Maximum rigid slip in the iteration, over mu N/(G c^2); larger slips are scaled down."""
 
 LIMIT = 0.03
-"""Residual, over the traction, above which the solution is repeated with the factors of the whole matrix."""
+"""Residual, over the traction, above which the solution is repeated with the factors of the full matrix."""
 
 DIRECT_ITERATIONS = 40
 
@@ -51,13 +51,13 @@ class Level(NamedTuple):
     """Resolution of the tangential problem."""
 
     strips: int
-    """Of a window, across."""
+    """Number of strips of a window, across."""
     panels: int
-    """Of a strip, along rolling; even."""
+    """Number of panels of a strip, in the rolling direction; even."""
     iterations: int
-    """Always done with a resolvent of a similar shape."""
+    """Fixed number of iterations with the resolvent of a similar shape."""
     reach: int
-    """Strips |i - j| <= reach that the band of B keeps where no ellipse is similar."""
+    """Half bandwidth of B in strips, |i - j| <= reach, used if no ellipse is similar."""
 
 
 LEVELS = {
@@ -66,22 +66,24 @@ LEVELS = {
     "fine": Level(16, 12, 16, 5),
     "slender": Level(8, 20, 24, 4),
 }
-"""Force error on ellipses and SDEC patches, 95 % of random cases, over mu N: 0.8, 0.6, 0.5 % for a/b from 0.2 to 3, and
-1 % for ``slender`` (a/b from 4 to 20), which wants panels along x, where spin turns the slip, rather than strips.
-At small creepage the iterations end within 0.3 % of adhesion everywhere, the spin moment of slender patches last."""
+"""Resolutions by name. Force errors over mu N on ellipses and SDEC patches, 95 % of random cases: 0.8, 0.6, 0.5 % for
+a/b from 0.2 to 3, and 1 % for ``slender`` (a/b from 4 to 20). Slender patches need more panels along x, because spin
+turns the slip along x. At small creepages the result is within 0.3 % of that for full adhesion; the spin moment of
+slender patches converges last."""
 
 
 class RollingWork(NamedTuple):
-    """Memory of one solution at a time (one per thread), float32 but for ``strip`` and ``scale``; sizes for up to M
-    strips of n panels, m = 2 n M unknowns."""
+    """Work arrays of one solution at a time (one set per thread), float32 except ``strip`` and ``scale``.
+
+    Sizes are for up to M strips of n panels, m = 2 n M unknowns."""
 
     matrix: np.ndarray
     factors: np.ndarray
-    """(m m,): B, row by row; the resolvent or the factors of I + B."""
+    """(m m,): B by rows is ``matrix``; ``factors`` is the resolvent or the factors of I + B."""
     corner: np.ndarray
-    """(4, (n+1)^2): distances of points and edges, and the three integrals there."""
+    """(4, (n+1)^2): distances of points and edges, and the three integrals at them."""
     slip: np.ndarray
-    """(3, n (n + 1)): slip of one strip by another, components xx, ss, xs."""
+    """(3, n (n + 1)): slip of one strip by forces on another, components xx, ss, xs."""
     strip: StripLayout
     scale: np.ndarray
     """(5,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), USED: the method of the last solution."""
@@ -96,18 +98,18 @@ class RollingWork(NamedTuple):
     shift: np.ndarray
     delta: np.ndarray
     ramp: np.ndarray
-    """(m,) the first two, (K, m) the rest, for K slips at once: vectors of the iteration; component x of a strip's
-    panels, then component s, strip by strip."""
+    """Vectors of the iteration: the first two (m,), the others (K, m) for K slips at once. For each strip, component x
+    of its panels, then component s."""
     elastic: np.ndarray
-    """(n + 2,): elastic slip along a strip between two zeros."""
+    """(n + 2,): elastic slip on a strip, with a 0 at either end."""
     slowed: np.ndarray
     residual: np.ndarray
-    """(K,): what slips are divided by, and residuals."""
+    """(K,): divisors of the slips are ``slowed``; residuals."""
 
 
 def rolling_work(strips, n, slips=1):
-    """`RollingWork` for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each, and for so
-    many ``slips`` at once."""
+    """Return a `RollingWork` for up to ``strips`` strips (of all windows together) of ``n`` panels, and for ``slips``
+    slips at once."""
     m = 2 * n * strips
     vectors = [np.zeros(m, np.float32) for _ in range(2)] + [np.zeros((slips, m), np.float32) for _ in range(9)]
     return RollingWork(
@@ -119,7 +121,7 @@ def rolling_work(strips, n, slips=1):
 
 @jit(allocates=False, fastmath=FUSED)
 def _project(size, n, z, bound, force, ramp):
-    """F = P(z): scale each two-vector back to its disk; ramp from 0 (sticks) to 1 (slides fully)."""
+    """Fill F = P(z), with vectors scaled back to their bounds, and ``ramp``: 0 adhesion, 1 full sliding."""
     for start in range(0, size, 2 * n):
         for i in range(start, start + n):
             ratio = np.sqrt(z[i] * z[i] + z[i + n] * z[i + n]) / bound[i]
@@ -132,8 +134,8 @@ def _project(size, n, z, bound, force, ramp):
 
 @jit(allocates=False, fastmath=FUSED)
 def _shift_slip(panels, start, relaxation, work, q):
-    """Relax delta of the q-th slip towards the change of slip between where it holds and the load, in one strip's
-    sliding panels; the elastic part of the slip is h (F - z) - delta - w."""
+    """Relax delta of the q-th slip towards the change of slip from slip point to load point, in one strip's sliding
+    panels. The elastic part of the slip is h (F - z) - delta - w."""
     n, elastic, force, z, delta, rigid = panels.n, work.elastic, work.force[q], work.z[q], work.delta[q], work.rigid[q]
     ramp, shift = work.ramp[q], work.shift[q]
     for i in range(n):
@@ -147,7 +149,7 @@ def _shift_slip(panels, start, relaxation, work, q):
 
 @jit(allocates=False, fastmath=FUSED)
 def _begin(size, work, q):
-    """Start of the q-th slip's iteration."""
+    """Set the start of the iteration for the q-th slip."""
     y, r, old, delta, z, rigid = work.y[q], work.r[q], work.product[q], work.delta[q], work.z[q], work.rigid[q]
     for i in range(size):
         y[i] = r[i] = old[i] = delta[i] = _ZERO
@@ -156,7 +158,7 @@ def _begin(size, work, q):
 
 @jit(allocates=False, fastmath=FUSED)
 def _bracket(size, lags, work, q):
-    """What the resolvent is applied to; B y, which it lags behind, is in ``work.product``."""
+    """Fill ``work.r``, to which the resolvent is applied; with ``lags``, ``work.product`` holds B y."""
     y, r, old, delta, z = work.y[q], work.r[q], work.product[q], work.delta[q], work.z[q]
     rigid, force = work.rigid[q], work.force[q]
     if lags:
@@ -168,7 +170,7 @@ def _bracket(size, lags, work, q):
 
 @jit(allocates=False, fastmath=FUSED)
 def _move(size, work, q):
-    """Step of the q-th slip's iteration; returns the residual."""
+    """Do one step of the iteration for the q-th slip; return the residual."""
     y, z, force, change, total = work.y[q], work.z[q], work.force[q], _ZERO, _TINY
     for i in range(size):
         move = y[i] - force[i]
@@ -180,8 +182,9 @@ def _move(size, work, q):
 
 @jit(allocates=False, fastmath=FUSED)
 def _iterate(panels, size, method, reach, windows, iterations, slips, work):
-    """Fixed number of iterations for so many slips; leaves forces in ``work.force``, and in ``work.residual`` the last
-    sum of abs(y - F) over that of abs(F)."""
+    """Do a fixed number of iterations for ``slips`` slips at once.
+
+    Fills ``work.force``, and ``work.residual`` with the last sum of abs(y - F) over that of abs(F)."""
     n = panels.n
     block = size // windows
     matrix = work.matrix[: size * size].reshape((size, size))
@@ -216,7 +219,7 @@ def _iterate(panels, size, method, reach, windows, iterations, slips, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work, q):
-    """Bounds and q-th rigid slip of the panels, over mu N and over mu N/(G c^2), and what the slip was divided by."""
+    """Fill bounds (over mu N) and q-th rigid slip (over mu N/(G c^2)) of the panels, and the divisor of the slip."""
     rigid, shift = work.rigid[q], work.shift[q]
     n, strip, scale = panels.n, work.strip, work.scale[TO_UNIT]
     scale_dx = scale * work.scale[LENGTH]
@@ -239,10 +242,10 @@ def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work, q):
 
 @jit(allocates=False, fastmath=FUSED)
 def _resultant(panels, count, work, q):
-    """(fx, fs, mn) of the q-th panel forces over mu N and mu N c; those of the strips into ``work.strip``.
+    """Return (fx, fs, mn) of the q-th panel forces over mu N and mu N c; fill the strips' forces in ``work.strip``.
 
-    At a slip that had to be divided by ``slow`` the force differs from that of the rigid slip alone by 1/slow of what
-    it does at the reduced slip."""
+    If the slip was divided by ``slow``, the difference of the force to that of pure rigid slip is 1/slow of the
+    difference at the reduced slip."""
     n, strip, slow = panels.n, work.strip, work.slowed[q]
     force, rigid, shift = work.force[q], work.rigid[q], work.shift[q]
     fx = fs = mn = 0.0
@@ -268,18 +271,18 @@ def rolling_force(
     centre, width, half_length, middle, peak, slip_x, slip_x_dx, slip_s, slip_s_dx, shear_modulus, mu,
     library, work, method,
 ):  # fmt: skip
-    """Creep force on the wheel of a patch given as strips: Fx, Fs (N), Mn (N m) about the normal at the frame's origin,
-    the residual (sum of the last changes of the panel forces over that of the forces: 0.01 goes with a force error of
-    1e-4), and the method used.
+    """Creep force on the wheel for a patch given as strips: Fx, Fs (N), Mn (N m) about the normal at the origin.
 
-    Strips (M,): lateral middles (ascending; a gap separates two windows) and widths, half length and middle, m, of the
-    pressure ``peak sqrt(1 - ((x - middle)/half_length)^2)``, Pa (0: no contact). Slips (M,): rigid slip of the wheel
-    relative to the rail over V along x and s at ``x = middle``, each followed by its derivative along x (1/m).
-    Creepages xi, eta, phi at the origin mean xi - phi centre, 0, eta + phi middle, phi.
+    Further results: the residual, sum of the last changes of the panel forces over that of the forces (0.01 corresponds
+    to a force error of 1e-4), and the method used. Strips (M,): lateral middles (ascending; a gap separates two
+    windows) and widths, half length and middle, m, of the pressure ``peak sqrt(1 - ((x - middle)/half_length)^2)``, Pa
+    (0: no contact). Slips (M,): rigid slip of the wheel relative to the rail over V along x and s at ``x = middle``,
+    each followed by its derivative along x (1/m). For creepages xi, eta, phi at the origin the slips are
+    xi - phi centre, 0, eta + phi middle, phi.
 
-    ``method``: AUTO is LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else
-    BAND, and DIRECT with more iterations if the residual then exceeds LIMIT; or LIBRARY (falls back on BAND), BAND,
-    DIRECT. ``work`` afterwards holds what `read_field` and `roll_again` need."""
+    ``method``: AUTO is LIBRARY if each window has ``library.level.strips`` strips and is similar to an ellipse, else
+    BAND; then DIRECT with more iterations if the residual exceeds LIMIT. LIBRARY (falls back on BAND), BAND and DIRECT
+    can be chosen. `read_field` and `roll_again` use the contents of ``work`` afterwards."""
     panels, scale, count = library.panels, work.scale, centre.size
     split = second_window(centre, width)
     windows = 1 if split == count else 2
@@ -299,8 +302,7 @@ def rolling_force(
 
 @jit(allocates=False, fastmath=FUSED)
 def roll_again(slips, library, work, forces):
-    """Forces (K, 3, M) as of `read_forces` for other ``slips`` (K, 4, M) of the strips solved last, with their
-    friction."""
+    """Fill ``forces`` (K, 3, M; see `read_forces`) for other ``slips`` (K, 4, M), with strips and friction as last."""
     panels, strip, (many, _, count) = library.panels, work.strip, slips.shape
     split = second_window(strip.centre[:count], strip.width[:count])
     for q in range(many):
@@ -313,7 +315,7 @@ def roll_again(slips, library, work, forces):
 
 @jit(allocates=False, fastmath=FUSED)
 def _prepare(panels, library, count, windows, split, method, work):
-    """Take factors from the library, or make them; returns the method to use."""
+    """Take factors from the library, or compute them; return the method to use."""
     if (method == AUTO or method == LIBRARY) and take_from_library(library, count, windows, split, work):
         return LIBRARY
     _factorise(panels, count, count if method == DIRECT else library.level.reach, work)
@@ -322,7 +324,7 @@ def _prepare(panels, library, count, windows, split, method, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _factorise(panels, count, reach, work):
-    """Factors of I + B, as far as ``reach`` strips apart."""
+    """Compute the factors of I + B without pairs of strips farther apart than ``reach``."""
     size = 2 * panels.n * count
     matrix = work.matrix[: size * size].reshape((size, size))
     factorise(matrix, 2 * panels.n, reach, work.factors[: size * size].reshape((size, size)))
@@ -330,8 +332,9 @@ def _factorise(panels, count, reach, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _solve(panels, level, count, windows, slips, retry, work):
-    """Iterate by the method whose factors are made, and if asked to ``retry`` by DIRECT where that is not enough;
-    returns the largest residual."""
+    """Iterate by the method of the present factors; return the maximum residual.
+
+    With ``retry``, repeat with DIRECT if the residual exceeds LIMIT."""
     residual = LIMIT
     for _ in range(2):
         used = int(work.scale[USED])
@@ -352,7 +355,7 @@ def _solve(panels, level, count, windows, slips, retry, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def read_forces(count, work, force):
-    """Forces of the strips of the last solution into (3, M): along x and s, N, moment about the middle, N m."""
+    """Fill ``force`` (3, M) with the forces on the strips: along x and s, N, and moment about the middle, N m."""
     strip, bound = work.strip, work.scale[BOUND]
     for j in range(count):
         force[0, j] = force[1, j] = force[2, j] = 0.0
@@ -363,12 +366,12 @@ def read_forces(count, work, force):
 
 @jit(allocates=False, fastmath=FUSED)
 def read_field(panels, count, work, field):
-    """Fields over the panels of the patch of ``count`` strips that `rolling_force` has solved last in this workspace,
-    into ``field`` (9, M n), strip by strip, from the leading edge backwards: x, s (m), traction on the wheel along x
-    and s (Pa), pressure (Pa), slip over V along x and s, 1 where the panel slides, dissipated power over V (Pa).
+    """Fill ``field`` (9, M n) with the fields over the panels of the last solution of `rolling_force` in ``work``.
 
-    The power is that of traction and slip times one factor, with which it adds up to what the force does on the rigid
-    slip: the upwind slip alone misses 10 to 40 % of it at the coarser levels."""
+    Panels are in order strip by strip, from the leading edge backwards. Rows: x, s (m), traction on the wheel along x
+    and s (Pa), pressure (Pa), slip over V along x and s, 1 where the panel slides, dissipated power over V (Pa). The
+    power of traction and slip is scaled by one factor to the total power of the force on the rigid slip; the upwind
+    slip misses 10 to 40 % of it at the coarser levels."""
     n, strip, scale, force, z = panels.n, work.strip, work.scale, work.force[0], work.z[0]
     rigid, shift = work.rigid[0], work.shift[0]
     c = scale[LENGTH]
