@@ -1,1 +1,1 @@
-"""One solved patch of any shape: `result` (fields and forces), `model` (settings and scratch), `solution`."""
+"""Solution of one contact patch: `result` (fields, forces), `model` (settings, work arrays), `solution`."""

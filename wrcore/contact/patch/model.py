@@ -1,4 +1,4 @@
-"""What the kernels of a run need to solve the real patch: settings and tables, and scratch arrays."""
+"""Settings, tables and work arrays with which the kernels of a run solve patches on strips."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -17,31 +17,31 @@ from wrcore.contact.surrogate.scratch import SurrogateScratch, surrogate_scratch
 from wrcore.errors import InputError, one_of
 
 PATCHES = ("maximum", "moment", "exact", "tabulated", "surrogate")
-"""Patch models by name: two reductions to an ellipse, exact strips, these looked up, and a trained network of them."""
+"""Names of patch models: two reductions to an ellipse, solution on strips, its lookup table, and a trained network."""
 
 STRIPS = "exact", "tabulated"
-"""Those that solve patches on strips, in a run or before it."""
+"""Patch models that solve patches on strips, in a run or before it."""
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
 
 
 class PairTable(NamedTuple):
-    """Exact contact of a wheel on its rail at the nodes of lattices, see `wrcore.wheels.table.lookup`; empty where it
-    is not looked up."""
+    """Lookup table of contact on strips for a wheel on its rail, see `wrcore.wheels.table.lookup`; empty without a
+    table."""
 
     keys: np.ndarray
     states: np.ndarray
-    """(n,) int64 and int32: cells by their keys, each with its number or its state."""
+    """(n,) int64 and int32: keys of the cells, and the number or the state of each cell."""
     cells: np.ndarray
-    """(n, NODES, NUMBERS) float32: what a cell is looked up from."""
+    """(n, NODES, NUMBERS) float32: numbers at the nodes of each cell."""
     misses: np.ndarray
-    """(n, 2) float32: errors in its middle, of N and of the creep force over mu N."""
+    """(n, 2) float32: errors of N and of the creep force over mu N in the middle of each cell."""
     modes: np.ndarray
-    """(2, n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages, of both
-    families."""
+    """(2, n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages, for both
+    families of modes."""
     fill: int
-    """Address of what solves a cell's nodes."""
+    """Address of the kernel that solves the nodes of a cell."""
 
 
 NO_TABLE = PairTable(
@@ -49,56 +49,57 @@ NO_TABLE = PairTable(
     np.zeros((0,) * 4, np.float32), 0,
 )  # fmt: skip
 NODES, NUMBERS, MODES = 48, 72, 24
-"""Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
+"""Number of nodes of a cell, of numbers at a node, and of modes of the creep force in each family."""
 
 LOBE_COLUMNS, SHARES = 10 + 2 * MAX_PATCHES, (12, 15)
-"""Of a lobe that is looked up, see `wrcore.wheels.table.coupled_lobes`, and of the cells that have a share in it, see
-`wrcore.wheels.table.cells`."""
+"""Number of columns of a sub-patch from the table, see `wrcore.wheels.table.coupled_lobes`; shape of the array of its
+cells, see `wrcore.wheels.table.cells`."""
 
 
 KERNEL, MODEL, ELLIPSES, LOBES, LOAD = range(5)
-"""Addresses in `StripModel.late`."""
+"""Indices of the addresses in `StripModel.late`."""
 
 
 class StripModel(NamedTuple):
-    """Settings and tables of patches on strips, for kernels; its arrays are empty without strips, and where patches are
-    looked up until one is to be solved (`with_tables`)."""
+    """Settings and tables of patches on strips, for kernels.
+
+    Arrays are empty without strips. With a lookup table they are empty until a patch must be solved (`with_tables`)."""
 
     strips: int
-    """Strips of a window; 0: patches are ellipses."""
+    """Number of strips of a window; 0: patches are ellipses."""
     surfaces: int
-    """1: rigid slip of the surfaces, strip by strip; 0: one set of creepages."""
+    """1: rigid slip of the surfaces in each strip; 0: one set of creepages per patch."""
     looked_up: float
-    """Coefficient of friction of the pair's table in which patches are looked up; 0: they are solved."""
+    """Coefficient of friction of the lookup table; 0: patches are solved directly."""
     values: np.ndarray
-    """Of `influence_table`."""
+    """Coefficients of `influence_table`."""
     library: Library
     wider: Library
     widest: Library
-    """Windows that are wide have 3/2 or 2 times the strips of others."""
+    """Libraries for 1, 3/2 and 2 times the usual number of strips, for windows of increasing width."""
     slender: Library
-    """Resolution of slender patches."""
+    """Library for slender patches."""
     fallback: int = 0
     """Address of the kernel that solves a patch on a grid."""
     table: PairTable = NO_TABLE
     group: int = 0
-    """Address of the kernel that adds what acts on a patch: looked up in the table or solved."""
+    """Address of the kernel that adds the wrench on a patch, from the table or from a solution."""
     late: np.ndarray = np.zeros(5, np.int64)
-    """Addresses of the kernel that solves a patch where it is looked up, of the model that it takes, of the kernel with
-    ellipses in its place, and of that of lobes that are apart, all 0 until they are needed, and of what then finds
-    them."""
+    """Addresses; the first four are 0 until they are needed. KERNEL: kernel that solves a patch outside the table;
+    MODEL: its model; ELLIPSES: the kernel with ellipses in its place; LOBES: the kernel for separate sub-patches; LOAD:
+    the kernel that finds these four."""
 
 
 class StripWork(NamedTuple):
-    """Scratch arrays of one patch at a time."""
+    """Work arrays for one patch at a time."""
 
     memory: np.ndarray
-    """(wheelsets, 2, MAX_PATCHES, MEMORY): last solutions, from which the next ones may start; part of what a run
-    knows."""
+    """(wheelsets, 2, MAX_PATCHES, MEMORY): last solutions, from which the next ones may start; part of the state of a
+    run."""
     spare: np.ndarray
-    """(MEMORY,): a memory of nothing, once its first number is 0; solutions are written into it."""
+    """(MEMORY,): memory for a solution without a start: its first number is set to 0 before use."""
     flags: np.ndarray
-    """(3,): what is asked of patches, see `wrcore.wheels.exact_force`."""
+    """(3,): options of the evaluation of patches, see `wrcore.wheels.exact_force`."""
     rows: np.ndarray
     out: np.ndarray
     strips: np.ndarray
@@ -106,22 +107,22 @@ class StripWork(NamedTuple):
     friction: np.ndarray
     """(3, MAX_STRIPS): forces on the strips, see `gap.strip_wrenches`."""
     wrench: np.ndarray
-    """(2, 6): of pressure and of friction."""
+    """(2, 6): wrenches of pressure and of friction."""
     sums: np.ndarray
     solved: np.ndarray
-    """(3,) int: strips of the last solution, 1 if they are slender, and windows."""
+    """(3,) int: number of strips of the last solution, 1 if the patch is slender, and number of windows."""
     lobes: np.ndarray
     numbers: np.ndarray
     weights: np.ndarray
     shares: np.ndarray
-    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and `SHARES`: of a patch that is looked up."""
+    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and `SHARES`: for a patch from the table."""
     spread: np.ndarray
     along: np.ndarray
     rest: np.ndarray
     lattice: np.ndarray
-    """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): of its slopes, see `wrcore.jacobian.table_wheel`."""
+    """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): for its derivatives, see `wrcore.jacobian.table_wheel`."""
     moments: np.ndarray
-    """(3, 5): of overlaps, see `wrcore.contact.search.moved.slopes_of_square`."""
+    """(3, 5): moments of overlaps, see `wrcore.contact.search.moved.slopes_of_square`."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -133,10 +134,11 @@ def _no_library(nu, level=Level(0, 0, 0, 0)):  # noqa: B008  a tuple
 
 
 def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0.3):
-    """`StripModel` of a scene's ``patch`` (of `PATCHES`), resolution (8, 12 or 16 strips of a window) and ``slip`` (of
-    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio, ``friction`` the coefficient
-    of a table. InputError for an unknown name.
-    """
+    """Return the `StripModel` for a scene's patch model, resolution and slip.
+
+    ``patch`` is one of `PATCHES`; ``resolution`` stands for 8, 12 or 16 strips of a window; ``slip`` is that of the
+    true surfaces or of one set of creepages per patch; ``nu`` is Poisson's ratio, ``friction`` the coefficient of a
+    table. InputError for an unknown name."""
     named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
     for name, (value, known) in named.items():
         if value not in known:
@@ -156,7 +158,7 @@ def _strip_model(patch, resolution, slip, nu, friction):
 
 
 def with_tables(model):
-    """A `StripModel` with all that a solution takes."""
+    """Return the `StripModel` with all tables of a direct solution."""
     bare = model._asdict()
     names = "library", "wider", "widest", "slender"
     libraries = {name: make_library(bare[name].level, bare[name].nu) for name in names}
@@ -164,8 +166,9 @@ def with_tables(model):
 
 
 def strip_work(model, wheelsets, slips=1, surrogate=None):
-    """Scratch arrays for a `StripModel`, a number of wheelsets, and so many ``slips`` of a patch at once; next to
-    nothing where patches are ellipses. ``surrogate``: the trained network, if the scene has one."""
+    """Return the work arrays for a `StripModel`, a number of wheelsets, and ``slips`` slips of a patch at once.
+
+    Arrays are small if patches are ellipses. ``surrogate``: the trained network, if the scene has one."""
     count, wheels, normal = MAX_STRIPS, (wheelsets, 2, MAX_PATCHES), normal_work()
     if not model.strips:
         count, wheels = 1, (0, 0, 0)

@@ -1,4 +1,4 @@
-"""A patch solved exactly on grids, with all its fields: for studies, and for judging other patch models."""
+"""Reference solution of a contact patch on grids, with all its fields: for studies and for errors of patch models."""
 
 import math
 
@@ -12,19 +12,19 @@ from wrcore.contact.search.surfaces import Motion, plane_slip, strip_planes, sur
 from wrcore.errors import InputError
 
 FINE = ((40, 32), (48, 40), (56, 48), (64, 48))
-"""Grids (along x, across) of a reference: forces are a straight line over the element size through all of them."""
+"""Grids (along x, across) of a reference; forces are extrapolated linearly in the element size."""
 
 
 def solve_on_grids(
     geometry, pose, plane, slip, friction=0.3, shear_modulus=8.2e10, poisson_ratio=0.28, grids=FINE, tolerance=1e-4
 ):
-    """`Patch` of a wheel in a pose on a contact plane, whose overlap counts as one, with forces extrapolated from
-    several grids; fields and normal force are those of the last one.
+    """Solve one contact patch of a wheel on grids over a contact plane; return the `Patch`.
 
-    ``slip``: the wheelset's `Motion`, for the rigid slip of the surfaces themselves, or (xi, eta, phi) at the plane's
-    origin, for that of a plane. ``grids``: elements along x (even) and across, about, coarse to fine; one is enough for
-    1 % of the friction bound. ``tolerance``: remaining change of the tractions over that bound. InputError for no such
-    grids."""
+    All overlaps are one patch. Forces are extrapolated from several grids; fields and normal force are those of the
+    last grid. ``slip``: the wheelset's `Motion`, for the rigid slip of the true surfaces, or (xi, eta, phi) at the
+    plane's origin, for the slip of a plane. ``grids``: approximate numbers of elements along x (even) and across,
+    coarse to fine; one grid has an error of 1 % of the friction bound. ``tolerance``: last change of the tractions over
+    that bound. InputError for other grids."""
     if not len(grids) or any(n % 2 or n < 8 or m < 4 for n, m in grids):
         raise InputError("solve_on_grids", "grids", f"expected even numbers from 8 along, 4 across, got {grids!r}")
     modulus = contact_modulus(shear_modulus, poisson_ratio)
@@ -44,7 +44,7 @@ def solve_on_grids(
 
 
 def _patch(pose, plane, slip, friction, grid, traction, forces):
-    """`Patch` of the elements of a grid."""
+    """Return the `Patch` whose cells are the elements of a grid."""
     x, s = (a.ravel() for a in np.meshgrid(grid.x, grid.s, indexing="ij"))
     fields = [a.ravel() for a in (traction.pressure, traction.px, traction.ps, traction.sx, traction.ss)]
     stick = (fields[0] > 0.0) & (fields[3] == 0.0) & (fields[4] == 0.0)

@@ -1,4 +1,4 @@
-"""One loaded contact patch with all its fields, whichever method has solved it."""
+"""Result of one loaded contact patch with all its fields, for all patch models."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 _MM, _MPA = 1e3, 1e-6
 _MOST_ARROWS = 18
-"""Along the longer side of a plot; a denser field is thinned out."""
+"""Maximum number of arrows on the longer side of a plot; denser fields are thinned out."""
 _LEGEND_BELOW = -0.45
-"""Upper edge of a plot's legend from the lower edge of its axes, inches: below the label."""
+"""Position of the legend's upper edge from the lower edge of the axes, inches: below the axis label."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +52,15 @@ class Patch:
     side : str
         left, right or empty.
     peak : float
-        Greatest pressure, Pa, where it is known better than from the cells; else NaN.
+        Maximum pressure, Pa, if it is known more accurately than from the cells; else NaN.
     ends : tuple of float
-        x_min, x_max, s_min, s_max, m, where they are known better than from the cells; else empty.
+        x_min, x_max, s_min, s_max, m, if they are known more accurately than from the cells; else empty.
     pose : tuple of float
         y, z (m), roll and yaw (rad) of the wheelset; may be empty.
     load_residual : float
-        Force that the wheel carries less the load that was asked, N; NaN where no load was.
+        Vertical force on the wheel minus the given load, N; NaN without a given load.
     flags : tuple of str
-        Limits that are exceeded: names of columns of ``wrcore contact``.
+        Exceeded limits: names of columns of ``wrcore contact``.
 
     Examples
     --------
@@ -100,18 +100,19 @@ class Patch:
 
     @property
     def cell_area(self) -> np.ndarray:
-        """Of each cell, m^2, shape (n,)."""
+        """Area of each cell, m^2, shape (n,)."""
         return self.dx * self.ds
 
     @property
     def touching(self) -> np.ndarray:
-        """Cells with pressure, shape (n,)."""
+        """Whether a cell has pressure, shape (n,)."""
         return self.pressure > 0.0
 
     @property
     def friction_work(self) -> np.ndarray:
-        """Friction's work in each cell per metre rolled and area, N/m^2, shape (n,): traction times slip, by one factor
-        such that it adds up to what the forces do on the creepages."""
+        """Frictional work in each cell per metre rolled and area, N/m^2, shape (n,).
+
+        It is traction times slip, scaled so that the total equals the work of the forces on the creepages."""
         work = -(self.traction_x * self.slip_x + self.traction_s * self.slip_s)
         total = work @ self.cell_area
         known = -(self.fx * self.xi + self.fs * self.eta + self.mn * self.phi)
@@ -119,12 +120,12 @@ class Patch:
 
     @property
     def p_max(self) -> float:
-        """Greatest pressure, Pa; of a grid: the greatest mean of a cell."""
+        """Maximum pressure, Pa; on a grid: the maximum of the means of cells."""
         return float(self.pressure.max(initial=0.0)) if math.isnan(self.peak) else self.peak
 
     @property
     def area(self) -> float:
-        """m^2."""
+        """Area of the contact patch, m^2."""
         return float(self.cell_area[self.touching].sum())
 
     @property
@@ -139,7 +140,7 @@ class Patch:
 
     @property
     def extent(self) -> tuple[float, ...]:
-        """x_min, x_max, s_min, s_max, m: outer edges of cells with pressure; NaN without contact."""
+        """Extent x_min, x_max, s_min, s_max, m: outer edges of cells with pressure; NaN without contact."""
         if self.ends:
             return self.ends
         at = self.touching
@@ -150,7 +151,7 @@ class Patch:
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """x and s of the pressure's centroid, m; NaN without contact."""
+        """Centroid x and s of the pressure, m; NaN without contact."""
         load = self.pressure * self.cell_area
         total = load.sum()
         return (float(load @ self.x / total), float(load @ self.s / total)) if total > 0.0 else (math.nan, math.nan)
@@ -217,7 +218,7 @@ class Patch:
         axes.legend(handles=list(swatches), ncols=2, frameon=False, **place)
 
     def _draw_arrows(self, axes):
-        """Traction in up to `_MOST_ARROWS` squared cells, spread evenly."""
+        """Draw the traction in up to `_MOST_ARROWS` squared cells, with even spacing."""
         at = np.flatnonzero(self.touching)
         if not at.size:
             return

@@ -1,8 +1,8 @@
-"""The rolling problem of one patch of a left wheel, on Galerkin strips or, where these do not converge, on a grid.
+"""Rolling contact of one patch of a left wheel, on Galerkin strips or, where these do not converge, on a grid.
 
-The rigid slip is that of the wheel's over the rail's surface, strip by strip, or follows one set of creepages.
-Pressure and friction act in each strip's own plane, on the wheel's material points, where the slip is taken: friction
-takes from the wheelset what it dissipates.
+The rigid slip is that of the wheel's surface over the rail's, in each strip, or that of one set of creepages. Pressure
+and friction act in each strip's plane, on the wheel's material points at which the slip is evaluated. The power that
+friction takes from the wheelset therefore equals the dissipated power.
 """
 
 import math
@@ -22,31 +22,31 @@ from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
 SLENDER = 3.0
-"""Length over width from which strips get more panels along rolling."""
+"""Ratio of length to width from which strips have more panels in the rolling direction."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
-"""Elements along and across the patch of the grid, and the tolerance of its tractions."""
+"""Number of grid elements along and across the patch, and relative tolerance of the tractions."""
 
 
 class Solution(NamedTuple):
-    """What is known of a patch beside its wrench."""
+    """Results of a patch in addition to its wrench."""
 
     xi: float
     eta: float
     phi: float
     """Mean creepages."""
     load: float
-    """Force of the pressure, N."""
+    """Normal force of the pressure, N."""
     x: float
     s: float
-    """Means over the pressure, m."""
+    """Centroid of the pressure, m."""
     a: float
     b: float
     """Semi-axes of the ellipse of equal moments, m."""
     p_max: float
-    """Pa."""
+    """Maximum pressure, Pa."""
     power: float
-    """Of friction, over V, N."""
+    """Power of friction over V, N."""
 
 
 NOTHING = Solution(*[0.0] * 10)
@@ -54,7 +54,7 @@ NOTHING = Solution(*[0.0] * 10)
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def mean_solution(one, other, share):
-    """Mean of two solutions of which the other has a ``share``."""
+    """Weighted mean of two solutions; ``share`` is the weight of ``other``."""
     rest = 1.0 - share
     return Solution(
         rest * one.xi + share * other.xi, rest * one.eta + share * other.eta, rest * one.phi + share * other.phi,
@@ -66,12 +66,12 @@ def mean_solution(one, other, share):
 
 @jit
 def solve_on_grid(model, m, pose, frame, creepage, friction, row):
-    """Fallback: a patch of a left wheel on a uniform grid; a kernel of its own that may allocate. Fills ``row``, about
-    the frame's origin and in its plane: friction (MZ about n), NORMAL, X and Y (means over the pressure of x and s),
-    semi-axes, greatest pressure, and as ANGLE the mean slope of the strips.
-    """
+    """Solve a patch of a left wheel on a uniform grid: the fallback, a separate kernel that may allocate.
+
+    Fills ``row``, about the frame's origin and in its plane: friction (MZ about n), NORMAL, X and Y (centroid x and s
+    of the pressure), semi-axes, maximum pressure, and as ANGLE the mean slope of the strips."""
     x = frame.x
-    if len(model.geometry.over) == 0:  # the grid knows no more than the section
+    if len(model.geometry.over) == 0:  # without `over` the grid sees a constant section
         x = with_rail_along(model.geometry, AHEAD, frame.ur, -1.0, x)
     plane = ContactPlane(x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
     modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
@@ -107,7 +107,9 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
 
 @jit(allocates=False, forceinline=True)
 def solve_overlaps(model, pose, low, high, memory, work):
-    """Number of windows, 0 where strips find no solution, and frame of the overlaps of a lifted wheel."""
+    """Solve the normal problem of overlaps of a wheel moved by the damping displacement.
+
+    Returns the number of windows, 0 if there is no solution on strips, and the contact frame."""
     settings = model.strips
     return solve.solve_patch(
         model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, memory,
@@ -117,7 +119,7 @@ def solve_overlaps(model, pose, low, high, memory, work):
 
 @jit(allocates=False, forceinline=True)
 def library_of(settings, work):
-    """The library whose ellipses have as many strips as the patch that is solved, and the scratch arrays with it."""
+    """Return the library with the number of strips of the solved patch, and its work arrays."""
     count, slender, windows = work.solved
     if slender:
         return settings.slender, work.slender
@@ -130,7 +132,7 @@ def library_of(settings, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _roll(model, friction, strips, slip, force, work):
-    """Creep force on the strips."""
+    """Fill ``force`` (3, n) with the creep forces on the strips."""
     count, (library, own) = work.solved[0], library_of(model.strips, work)
     rolling.rolling_force(
         strips[solve.OWN_PLACE, :count], strips[solve.OWN_WIDTH, :count], strips[solve.HALF_LENGTH, :count],
@@ -142,7 +144,7 @@ def _roll(model, friction, strips, slip, force, work):
 
 @jit(allocates=False)
 def _turn_round(strips, slip, force, count):
-    """Turn a patch round: x points back, and slips and forces across change their sign."""
+    """Reverse the x axis of a patch, in place: x and the lateral slips and forces change their sign."""
     for i in range(count):
         strips[solve.MIDDLE, i], slip[1, i], slip[2, i] = -strips[solve.MIDDLE, i], -slip[1, i], -slip[2, i]
         force[1, i] = -force[1, i]
@@ -150,7 +152,7 @@ def _turn_round(strips, slip, force, count):
 
 @jit(allocates=False, fastmath=FUSED)
 def _mean_slip(strips, slip, load, x, count):
-    """Creepages at the pressure's centroid: means of the rigid slip over the pressure."""
+    """Creepages at the pressure's centroid: means of the rigid slip weighted with the pressure."""
     xi = eta = phi = 0.0
     for i in range(count):
         share = strips[solve.STRIP_LOAD, i] / load
@@ -162,7 +164,7 @@ def _mean_slip(strips, slip, load, x, count):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_wrenches(geometry, pose, frame, count, share, work):
-    """Add ``share`` of what acts on the strips to ``work.wrench``; returns the power of friction over V."""
+    """Add ``share`` times the wrenches on the strips to ``work.wrench``; return the power of friction over V (N)."""
     strips, slip, force = work.strips, work.slip, work.friction
     wrenches_of_strips(
         geometry, pose, frame, strips[solve.CENTRE, :count], strips[solve.MIDDLE, :count],
@@ -177,7 +179,8 @@ def _add_wrenches(geometry, pose, frame, count, share, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work):
-    """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``."""
+    """Solve for friction after the normal problem; return the `Solution`, add ``share`` of the wrench to
+    ``work.wrench``."""
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
     count = solve.publish(model.shear_modulus / (1.0 - model.poisson_ratio), work.normal, windows, strips, sums)
     load, x, s = sums[solve.LOAD], sums[solve.MEAN_X], sums[solve.MEAN_S]
@@ -209,7 +212,9 @@ def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, wo
 
 @jit(allocates=False, fastmath=FUSED)
 def roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
-    """As `roll_patch`, on a grid: it acts on one strip at the pressure's centroid. ``row`` is overwritten."""
+    """Solve a patch on a grid; return the `Solution`, add the wrench to ``work.wrench``.
+
+    The forces act on one strip at the pressure's centroid. ``row`` is overwritten."""
     strips, slip, force = work.strips, work.slip, work.friction
     call_address(model.strips.fallback, model, m, pose, frame, creepage, friction, row)
     (xi, eta, phi), x, s, load = creepage, row[reduction.X], row[reduction.Y], row[reduction.NORMAL]
@@ -226,12 +231,12 @@ def roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def fill_row(geometry, lean, frame, y, z, found, wrenches, out):
-    """Row of a patch about the pressure's centroid, from the wrenches of pressure and friction, in axes that ``lean``.
+    """Fill the row ``out`` of a patch about the pressure's centroid, from the wrenches of pressure and friction.
 
-    The pressure's resultant is the normal; the force along it holds what friction in the strips' planes has there.
-    Creepages are the means of the rigid slip, moved by the least with which the forces do on them what friction does on
-    the slip. ``y``, ``z``: of the frame's origin from the wheelset's centre.
-    """
+    Axes are rotated by ``lean``. The resultant of the pressure defines the normal; the normal force includes the
+    component of friction along it. Creepages are the means of the rigid slip with the minimum correction that makes the
+    power of the forces equal to that of friction on the slip. ``y``, ``z``: frame's origin from the wheelset's centre
+    (m)."""
     pressure, friction, a, b = wrenches[0], wrenches[1], found.a, found.b
     normal = math.sqrt(pressure[1] * pressure[1] + pressure[2] * pressure[2])
     cosine, sine = pressure[2] / normal, -pressure[1] / normal
