@@ -1,1 +1,1 @@
-"""Pressure and friction in a patch on a uniform grid: reference and fallback, which never fails."""
+"""Pressure and friction in a patch on a uniform grid: reference, and fallback that cannot fail."""

@@ -1,8 +1,8 @@
-"""Sharp ends of a contact along x, from pressures that are constant in elements.
+"""Accurate ends of a contact along x, from pressures that are constant in elements.
 
-A row of elements ends where an element begins, up to half an element beside the true edge, and creep forces feel where
-the leading edge lies. The gap of a wheel on a rail is a parabola along x, the pressure of a row therefore close to a
-semi-ellipse: one through the row's inner elements shows its ends to a few hundredths of an element.
+The end of a row of elements has an error of up to half an element, and creep forces depend on the position of the
+leading edge. The gap of a wheel on a rail is a parabola along x, so that the pressure of a row is close to a
+semi-ellipse. A fit to the row's inner elements gives its ends with errors of a few hundredths of an element.
 """
 
 import math
@@ -10,15 +10,15 @@ import math
 from wrcore.kernels.jit import jit
 
 FARTHEST = 1.5
-"""Elements by which a fitted end or middle may differ from the row's own; further off the row is left as it is."""
+"""Maximum distance, in elements, of a fitted end or middle from that of the row; otherwise the row is not changed."""
 
 _REPLACED = 2
-"""Elements at either end of a row whose pressure is replaced."""
+"""Number of elements at either end of a row whose pressure is replaced."""
 
 
 @jit(allocates=False)
 def _semi_ellipse(pressure, j, first, last, x, dx):
-    """Fit p^2 = q (c - (x - m)^2) to a row's inner elements, weighted with p^2: q, c, m; q = 0 where that fails."""
+    """Fit p^2 = q (c - (x - m)^2) to a row's inner elements, weighted with p^2; return q, c, m, or q = 0 on failure."""
     m0 = m1 = m2 = m3 = m4 = r0 = r1 = r2 = 0.0
     middle, half = 0.5 * (x[first] + x[last]), 0.5 * (last - first + 1) * dx
     for i in range(first + 1, last):
@@ -54,8 +54,9 @@ def _area_below(c, t):
 
 @jit
 def with_sharp_edges(pressure, x, dx):
-    """Pressures (nx, ns) of `solve_pressure` whose outermost elements carry what a semi-ellipse through the row has in
-    them; every row (fixed s, elements ``dx`` long about ``x``, m) carries the same load as before."""
+    """Return the pressures (nx, ns) of `solve_pressure` with the outermost elements from a semi-ellipse in each row.
+
+    A row has a fixed s and elements of length ``dx`` about ``x``, m. Its load does not change."""
     nx, ns = pressure.shape
     out = pressure.copy()
     for j in range(ns):

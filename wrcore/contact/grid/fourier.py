@@ -1,4 +1,6 @@
-"""Discrete Fourier transform in two dimensions for kernels: sizes are powers of two, real and imaginary parts apart."""
+"""Discrete Fourier transform in two dimensions for kernels, for sizes of powers of two.
+
+Real and imaginary parts are separate arrays."""
 
 import math
 
@@ -9,7 +11,7 @@ from wrcore.kernels.jit import FAST, jit
 
 @jit
 def power_of_two(n):
-    """The least power of two that is not below n."""
+    """Return the smallest power of two that is not below n."""
     size = 1
     while size < n:
         size *= 2
@@ -47,8 +49,8 @@ def _transposed(a):
 
 @jit
 def transform(re, im):
-    """Transform of re + i im, transposed; the parts given are overwritten.
+    """Return the transform of re + i im, transposed; the arguments are overwritten.
 
-    Transforming (im, re) of the result gives the same times its size, back in the first order: (im, re)."""
+    Inverse: the transform of (im, re) of the result is (im, re) of the original, in its order, times its size."""
     re, im = _along_columns(re, im)
     return _along_columns(_transposed(re), _transposed(im))

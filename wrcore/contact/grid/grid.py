@@ -1,9 +1,9 @@
-"""Exact contact of one patch on a uniform grid: the reference of other patch models, and what they fall back on.
+"""Contact of one patch on a uniform grid: reference and fallback of other patch models.
 
-`grid_normal` finds where the surfaces overlap in a contact plane, lays a grid over the part that touches, and solves
-the normal problem there (`grid_pressure`); `grid_rolling` adds the tangential one (`grid_traction`). Neither can fail:
-the normal problem is convex, the tangential one monotone, and both iterations stop after a number of steps with a
-result that keeps all bounds. All kernels may be called from others; they allocate.
+`grid_normal` finds the overlaps of the surfaces in a contact plane, chooses a grid over the part in contact, and solves
+the normal problem (`grid.pressure`). `grid_rolling` solves the tangential problem (`grid.traction`). Neither can fail:
+the normal problem is convex, the tangential problem monotone. Both iterations stop after a maximum number of steps with
+a result within all bounds. All kernels can be called from other kernels; they allocate.
 """
 
 import math
@@ -19,23 +19,23 @@ from wrcore.contact.search.surfaces import NO_RAIL, rail_height, rail_over, stat
 from wrcore.kernels.jit import jit
 
 REACH = 0.04
-"""Half of the width around a plane's origin in which overlaps are looked for, m."""
+"""Half width around a plane's origin of the search for overlaps, m."""
 
 SEARCH_STEP = 2.5e-4
-"""Distance of the strips of that search, m."""
+"""Spacing of the strips in this search, m."""
 
 COARSE, COARSE_STEP, MOST_COARSE = 16, 4e-4, 64
-"""Elements along and, from as many up, across the overlap of the first solution, which shows where contact is; their
-size across (m), so that it finds lobes that have just been born."""
+"""Grid of the first solution, which locates the contact: number of elements along x, also the minimum across; size of
+the elements across (m), small enough for the smallest sub-patches; maximum number across."""
 
 MOST_EXTENSIONS = 10
-"""Times that a grid is widened by a quarter because contact has reached its border."""
+"""Maximum number of extensions of a grid, by a quarter each, where contact reaches its border."""
 
 MOST_ACROSS = 4
-"""Elements across are at most so many times those asked for, where lobes leave a gap between them."""
+"""Maximum number of elements across over the requested number, for sub-patches with a gap between them."""
 
 TOLERANCE, COARSE_TOLERANCE = 1e-5, 1e-3
-"""Of the conditions of normal contact, over the largest overlap."""
+"""Tolerances of the conditions of normal contact, over the maximum overlap: final and first solution."""
 
 
 class GridPatch(NamedTuple):
@@ -47,11 +47,11 @@ class GridPatch(NamedTuple):
     dx: float
     ds: float
     gap: np.ndarray
-    """Between the undeformed surfaces, m."""
+    """Gap between the undeformed surfaces, m."""
     height: np.ndarray
-    """Of the wheel over the plane, m."""
+    """Height of the wheel over the plane, m."""
     pressure: np.ndarray
-    """Pa."""
+    """Normal pressure, Pa."""
 
 
 class GridTraction(NamedTuple):
@@ -62,23 +62,23 @@ class GridTraction(NamedTuple):
     """Traction on the wheel, Pa."""
     sx: np.ndarray
     ss: np.ndarray
-    """Slip of the wheel over the rail, over the speed; zero where they adhere."""
+    """Slip of the wheel over the rail, over the speed; zero in adhesion."""
     fx: float
     fs: float
     mn: float
     """Force (N) and moment about the normal at the plane's origin (N m), extrapolated to dx = 0."""
     fine: tuple
     coarse: tuple
-    """The same on the grid and on one with elements twice as long."""
+    """Forces and moment without extrapolation: on the grid, and with elements of twice the length."""
     iterations: int
-    """Negative where the tolerance was not met."""
+    """Number of iterations, negative if the tolerance was not met."""
     pressure: np.ndarray
-    """That bounds the tractions, with sharp edges, Pa."""
+    """Pressure with accurate ends that bounds the tractions, Pa."""
 
 
 @jit(allocates=False)
 def _overlap_over(geometry, pose, plane, s, u, rail):
-    """As `_strip_overlap`, on a rail that changes along the track, looked at from station to station."""
+    """Return the results of `_strip_overlap` on a rail that changes along the track, evaluated at its stations."""
     least, first, last, guess = NO_RAIL, 0.0, -1.0, rail
     step = station_of(geometry, 1) - station_of(geometry, 0)
     for i in range(len(geometry.over)):
@@ -95,9 +95,9 @@ def _overlap_over(geometry, pose, plane, s, u, rail):
 
 @jit(allocates=False)
 def _strip_overlap(geometry, pose, plane, s, u, middle):
-    """One strip at s: u of the rail, place of the least gap along x, that gap, and half the overlap's length.
+    """Overlap of one strip at s: rail coordinate u, position of the minimum gap along x, this gap, and half the length.
 
-    The gap over x is a parabola to the fourth order: three points around the last guess, twice."""
+    The gap over x is a parabola up to fourth order, fitted to three points around the last guess."""
     rail, u = rail_height(geometry, pose, plane, s, u)
     gap, curvature, step = NO_RAIL, 1.0, 2e-3
     if rail != rail:
@@ -109,7 +109,7 @@ def _strip_overlap(geometry, pose, plane, s, u, middle):
         here = wheel_height(geometry, pose, plane, middle, s, rail)
         behind = wheel_height(geometry, pose, plane, middle - step, s, rail)
         second = ahead - 2.0 * here + behind
-        if not second > 0.0:  # also where a profile has ended
+        if not second > 0.0:  # also beyond the end of a profile
             return u, middle, NO_RAIL, 0.0
         move = 0.5 * step * (behind - ahead) / second
         gap, curvature = here - rail - 0.125 * (behind - ahead) ** 2 / second, 0.5 * second / step**2
@@ -121,9 +121,9 @@ def _strip_overlap(geometry, pose, plane, s, u, middle):
 
 @jit
 def overlap_window(geometry, pose, plane):
-    """Where the undeformed surfaces overlap around a plane's origin, and contact lies: x_min, x_max, s_min, s_max (m),
-    with x_min > x_max where nothing does. Overlaps further than `JOINED` from those nearer to the origin are left out.
-    """
+    """Bounds x_min, x_max, s_min, s_max (m) of the overlap of the undeformed surfaces around a plane's origin.
+
+    Without overlap x_min > x_max. Overlaps further than `JOINED` from those nearer to the origin are left out."""
     count = int(REACH / SEARCH_STEP)
     x_min, x_max, s_min, s_max = np.inf, -np.inf, np.inf, -np.inf
     for direction in (1, -1):
@@ -141,7 +141,7 @@ def overlap_window(geometry, pose, plane):
 
 @jit
 def _solve_window(geometry, pose, plane, modulus, window, nx, ns, tolerance):
-    """Normal contact on nx by ns elements over a window."""
+    """Solve normal contact on nx by ns elements over a window; return the `GridPatch`."""
     dx, ds = (window[1] - window[0]) / nx, (window[3] - window[2]) / ns
     x = window[0] + dx * (np.arange(nx) + 0.5)
     s = window[2] + ds * (np.arange(ns) + 0.5)
@@ -153,8 +153,10 @@ def _solve_window(geometry, pose, plane, modulus, window, nx, ns, tolerance):
 
 @jit
 def contact_window(patch, margin):
-    """Bounds of the contact on a grid, wider by ``margin`` elements, and the share of its rows across that touch; all
-    zero and 1 without contact."""
+    """Return the bounds (m) of the contact on a grid, extended by ``margin`` elements, and the fraction of rows in
+    contact.
+
+    Rows are counted between the bounds across. Without contact the bounds are 0 and the fraction is 1."""
     i0, i1, j0, j1 = patch.x.size, 0, patch.s.size, 0
     touching = np.zeros(patch.s.size, np.int64)
     for i in range(patch.x.size):
@@ -171,9 +173,10 @@ def contact_window(patch, margin):
 
 @jit
 def grid_normal(geometry, pose, plane, modulus, nx, ns):
-    """Normal contact (`GridPatch`) of a wheel in a pose on a grid over a contact plane, whose overlap counts as one
-    patch; ``modulus`` is E* (Pa). About ``nx`` by ``ns`` elements cover the contact, more across where lobes leave a
-    gap; without overlap the grid is one element without pressure."""
+    """Solve normal contact of a wheel on a grid over a contact plane; return the `GridPatch`.
+
+    All overlaps are one patch; ``modulus`` is E* (Pa). About ``nx`` by ``ns`` elements cover the contact, more across
+    for sub-patches with a gap between them. Without overlap the grid is one element without pressure."""
     window = overlap_window(geometry, pose, plane)
     if not window[0] < window[1]:
         one = np.zeros(1)
@@ -204,7 +207,7 @@ def grid_normal(geometry, pose, plane, modulus, nx, ns):
 
 @jit
 def _resultant(x, s, dx, ds, px, ps):
-    """Force and moment of tractions."""
+    """Forces fx, fs (N) and moment mn (N m) of tractions."""
     fx = fs = mn = 0.0
     for i in range(x.size):
         for j in range(s.size):
@@ -217,15 +220,16 @@ def _resultant(x, s, dx, ds, px, ps):
 
 @jit
 def _paired(field):
-    """Mean over two neighbours along x."""
+    """Mean of each pair of neighbours along x."""
     return 0.5 * (field[::2] + field[1::2])
 
 
 @jit
 def grid_rolling(patch, wx, ws, friction, shear_modulus, poisson, tolerance):
-    """Steady rolling contact (`GridTraction`) for the pressure on a grid with an even number of elements along x;
-    ``wx``, ``ws`` (nx, ns): rigid slip of the wheel over the rail, over the speed; ``tolerance``: remaining change of
-    the tractions, relative to them."""
+    """Solve steady rolling contact for the pressure on a grid; return the `GridTraction`.
+
+    The grid has an even number of elements along x. ``wx``, ``ws`` (nx, ns): rigid slip of the wheel over the rail,
+    over the speed; ``tolerance``: last change of the tractions, relative to them."""
     nx, ns = patch.pressure.shape
     px, ps, sx, ss = np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns))
     none = (0.0, 0.0, 0.0)

@@ -5,8 +5,8 @@ conditions of contact,
 
     e = g + u = 0  where p > 0,      e >= 0  where p = 0,      u = 1/(pi E*) int p/R dA,
 
-are those of a convex minimum, which conjugate gradients with an active set reach from any start. Arrays over the grid
-have shape (nx, ns): x along rolling, s across. Nothing here knows wheels or rails.
+are those of a convex minimum, to which conjugate gradients with an active set converge from any start. Arrays over the
+grid have shape (nx, ns): x in the rolling direction, s across. The bodies can have any shape.
 
 References
 ----------
@@ -22,7 +22,7 @@ import numpy as np
 from wrcore.kernels.jit import jit
 
 MOST_STEPS = 2000
-"""Of conjugate gradients; a tenth of it is rarely reached."""
+"""Maximum number of steps of conjugate gradients; more than a tenth is rarely needed."""
 
 
 @jit(allocates=False, forceinline=True)
@@ -35,8 +35,9 @@ def corner_integrals(x, y):
 
 @jit
 def normal_influence(nx, ns, dx, ds):
-    """Integral of 1/R (m) over an element of dx by ds (m), at the centre of another: entry (i, j, k) of (nx, ns, ns)
-    for elements i rows apart, at j and k across."""
+    """Integral of 1/R (m) over an element of dx by ds (m), at the centre of another element.
+
+    Entry (i, j, k) of (nx, ns, ns) is for elements at a distance of i rows along x, at j and k across."""
     corner = np.empty((nx + 1, ns + 1))
     for i in range(nx + 1):
         for j in range(ns + 1):
@@ -54,8 +55,9 @@ def normal_influence(nx, ns, dx, ds):
 
 @jit
 def convolve(blocks, p, pair, part, out):
-    """out = sum over elements of influence times p: a product of matrices per distance of two rows; ``pair`` and
-    ``part`` are work space of p's shape."""
+    """Fill ``out`` with the sum over elements of influence times p, by one matrix product per distance of two rows.
+
+    ``pair`` and ``part`` are work arrays of the shape of p."""
     nx, ns = p.shape
     np.dot(p, blocks[0], out)
     for d in range(1, nx):
@@ -70,7 +72,7 @@ def convolve(blocks, p, pair, part, out):
 
 @jit(allocates=False)
 def _residual(p, e):
-    """Sum of e^2 over the contact, and the largest violation of the conditions."""
+    """Return the sum of e^2 over the contact, and the maximum violation of the conditions."""
     square, worst = 0.0, 0.0
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
@@ -84,7 +86,7 @@ def _residual(p, e):
 
 @jit(allocates=False)
 def _advance(p, e, t, q):
-    """One step along t (its displacement is q) with p >= 0; whether an element has left or entered the contact."""
+    """Do one step in the direction t, with displacement q, keeping p >= 0; return whether the contact area changed."""
     top = bottom = 0.0
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
@@ -105,9 +107,10 @@ def _advance(p, e, t, q):
 
 @jit
 def solve_pressure(gap, dx, ds, modulus, tolerance, pressure):
-    """Pressure (Pa, written) for a gap (nx, ns) between undeformed bodies along the normal (m, negative where they
-    overlap), to a tolerance of the conditions of contact over the largest overlap. Returns the steps taken, negative if
-    it was not met after `MOST_STEPS`."""
+    """Fill ``pressure`` (Pa) for a ``gap`` (nx, ns) between undeformed bodies along the normal (m, < 0 in overlap).
+
+    ``tolerance`` is that of the conditions of contact, over the maximum overlap. Returns the number of steps, negative
+    if the tolerance was not met after `MOST_STEPS`."""
     nx, ns = gap.shape
     p, t, q = np.empty((nx, ns)), np.zeros((nx, ns)), np.empty((nx, ns))
     depth = 0.0

@@ -8,9 +8,9 @@ of the contact moves from an element to the one behind it, so that the slip at a
 which is of first order in dx. Either s = 0, or p is at its bound and opposes s. Kernel K: see
 `wrcore.contact.rolling.ellipse_influence`.
 
-The iteration is that of Douglas and Rachford as in `wrcore.contact.rolling.ellipse`, but over a whole periodic grid
-twice the size of the patch: outside the patch the bound is zero, and the resolvent (H + A)^-1 H is exact in Fourier's
-space for any shape, with nothing to factorise. It converges for every monotone A, so for every input.
+The iteration is that of Douglas and Rachford as in `wrcore.contact.rolling.ellipse`, but over a periodic grid of twice
+the size of the patch. Outside the patch the bound is zero. The resolvent (H + A)^-1 H is exact in Fourier space for any
+shape, without factorisation. The iteration converges for every monotone A, so for every input.
 """
 
 import math
@@ -22,7 +22,8 @@ from wrcore.contact.grid.pressure import corner_integrals
 from wrcore.kernels.jit import jit
 
 STEP_SCALE = 6.0
-"""H over the diagonal of A: 40 to 50 iterations (4 to 8 do as well on square grids, slender patches like less)."""
+"""Ratio of H to the diagonal of A. With 6 there are 40 to 50 iterations; 4 to 8 are as fast on square grids, smaller
+values are better for slender patches."""
 
 RELAXATION = 1.8
 MOST_ITERATIONS = 400
@@ -30,8 +31,10 @@ MOST_ITERATIONS = 400
 
 @jit
 def slip_influence(nx, ns, dx, ds, shear_modulus, poisson):
-    """Slip at an element by a unit traction (Pa) on another one, on a periodic grid of nx by ns elements (even): xx,
-    ss, xs, (3, nx, ns), for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element that slips from the loaded one."""
+    """Slip at an element by a unit traction (Pa) on another one, on a periodic grid of nx by ns elements (even).
+
+    Components xx, ss, xs, (3, nx, ns), for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element with the slip from
+    the loaded one."""
     rows, lines = nx // 2, ns // 2
     corner, u, table = np.empty((3, rows + 3, lines + 2)), np.empty((3, rows + 2, lines + 1)), np.empty((3, nx, ns))
     for i in range(rows + 3):
@@ -58,7 +61,9 @@ def slip_influence(nx, ns, dx, ds, shear_modulus, poisson):
 
 @jit
 def _resolvent(table, step):
-    """Factors of the transform z of (x, s) packed as x + i s: (H + A)^-1 H z = even z(k) + odd conj(z(-k))."""
+    """Return the factors of the resolvent on the transform z of a field x + i s.
+
+    (H + A)^-1 H z = even z(k) + odd conj(z(-k))."""
     nx, ns = table.shape[1:]
     re, im = transform(table[0].copy(), table[1].copy())
     cross_re, cross_im = transform(table[2].copy(), np.zeros((nx, ns)))
@@ -78,7 +83,7 @@ def _resolvent(table, step):
 
 @jit
 def _apply(even, odd, re, im):
-    """Resolvent of a field re + i im; overwrites it."""
+    """Return the resolvent applied to a field re + i im; the arguments are overwritten."""
     re, im = transform(re, im)
     ns, nx = re.shape
     out_re, out_im = np.empty((ns, nx)), np.empty((ns, nx))
@@ -95,7 +100,7 @@ def _apply(even, odd, re, im):
 
 @jit(allocates=False)
 def _project(zx, zs, limit, fx, fs):
-    """F = P(z): vectors z scaled back to their limit."""
+    """Fill F = P(z): the vectors z scaled back to their limit."""
     for i in range(limit.shape[0]):
         for j in range(limit.shape[1]):
             size = math.sqrt(zx[i, j] * zx[i, j] + zs[i, j] * zs[i, j])
@@ -105,11 +110,12 @@ def _project(zx, zs, limit, fx, fs):
 
 @jit
 def solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px, ps, sx, ss):
-    """Traction on the wheel (``px``, ``ps``, Pa) and slip (``sx``, ``ss``), written, for a bound mu p_n (Pa; 0 outside
-    the contact) and the rigid slip (``wx``, ``ws``) of the wheel over the rail, over the speed; all (nx, ns).
+    """Fill traction on the wheel (``px``, ``ps``, Pa) and slip over the speed (``sx``, ``ss``) in rolling contact.
 
-    The contact moves towards larger x over both surfaces. ``tolerance``: remaining change of the traction, summed up,
-    over the sum of the traction. Returns the iterations, negative if it was not met after `MOST_ITERATIONS`."""
+    ``bound`` is mu p_n (Pa; 0 outside the contact); ``wx``, ``ws`` are the rigid slip of the wheel over the rail, over
+    the speed; all (nx, ns). The contact moves towards larger x over both surfaces. ``tolerance``: sum of the last
+    changes of the traction over the sum of the traction. Returns the number of iterations, negative if the tolerance
+    was not met after `MOST_ITERATIONS`."""
     nx, ns = bound.shape
     wide, long = power_of_two(2 * nx - 1), power_of_two(2 * ns - 1)
     table = slip_influence(wide, long, dx, ds, shear_modulus, poisson)
