@@ -1,1 +1,1 @@
-"""Rails that change along the track and wheels out of round, as a wheel sees them."""
+"""Equivalent sections for rails that change along the track and for wheels out of round."""

@@ -1,9 +1,9 @@
-"""A wheel out of round, as the rail below it feels it.
+"""Gap between a wheel out of round and its rail, by an equivalent change of the rail's height.
 
-Of a wheel of revolution with radii R(u) and one with radii R(u) + dR(angle, u) about the same axle the second reaches
-less or further down. At each point along the track and across, that difference of depths may as well be added to the
-rail's height: the gap is the same. So a wheel out of round is a wheel of revolution on a rail that changes along the
-track (`wrcore.contact.changing_rails.sections`).
+A wheel out of round has radii R(u) + dR(angle, u), a wheel of revolution about the same axle has radii R(u). At each
+point of the track the difference of their heights can be added to the rail's height: the gap is the same. A wheel out
+of round is therefore treated as a wheel of revolution on a rail that changes along the track
+(`wrcore.contact.changing_rails.sections`).
 """
 
 import math
@@ -17,17 +17,18 @@ from wrcore.geometry.profiles.profile import SPACING
 from wrcore.kernels.jit import jit
 
 STEP = 1e-3
-"""Angles at which the wheel's sections are taken, rad; a cubic runs between them."""
+"""Step of the angles at which the wheel's sections are evaluated, rad; they are interpolated by cubics."""
 
 
 def reach_beyond(slices, wheel, pose, turned, x, strips):
-    """How much further down a wheel of slices reaches than the wheel of revolution, (n, m), m; NaN beside its profile.
+    """Depth by which a wheel of slices reaches further down than the wheel of revolution, (n, m), m; NaN outside its
+    profile.
 
     Parameters
     ----------
     slices : WheelSlices
     wheel : ContactGeometry
-        Of the wheel of revolution.
+        Geometry of the wheel of revolution.
     pose : Pose
     turned : float
         Angle by which the wheel has rolled forward, rad.
@@ -47,7 +48,7 @@ def reach_beyond(slices, wheel, pose, turned, x, strips):
 
 @dataclass(frozen=True, eq=False)
 class SlicedWheel:
-    """The shape of a wheel of slices, beside a wheel of revolution with a ``radius`` (m) at the tape circle."""
+    """Shape of a wheel of slices, relative to a wheel of revolution with a ``radius`` (m) at the tape circle."""
 
     slices: WheelSlices
     radius: float
@@ -60,11 +61,13 @@ class SlicedWheel:
         return 8.0 * self.radius * np.diff(self.slices.angles).min(initial=TURN)
 
     def nodes(self, step, pad):
-        """As those of `OutOfRound`: all round."""
+        """Return first node, step and number of nodes over one turn, as `OutOfRound.nodes`."""
         return whole_turn(step / self.radius, pad)
 
     def within(self, strips):
-        """Those of its strips (m,), evenly apart, around the tape circle that all slices have: first and last."""
+        """Return the first and last index of the strips around the tape circle that exist in all slices.
+
+        ``strips`` (m,) are equally spaced wheel coordinates, m."""
         angles = np.concatenate([self.slices.angles, np.arange(0.0, TURN, 1e-2)])
         there = np.isfinite(self.slices.heights(angles, strips)[0]).all(axis=0)
         middle = int(np.argmin(np.abs(strips)))
@@ -75,8 +78,9 @@ class SlicedWheel:
         return int(low[-1]) + 1 if low.size else 0, int(high[0]) - 1 if high.size else strips.size - 1
 
     def reach_over(self, wheel, strips):
-        """`reach_beyond` of a wheelset in the middle, without roll and yaw, for the same ``strips``, evenly apart,
-        again and again: a function of the angle turned and the stations."""
+        """Return a function of the angle turned and the stations that computes `reach_beyond` for a centred wheelset.
+
+        The wheelset has no roll and yaw. The function is fast for repeated calls with equally spaced ``strips``."""
         count = math.ceil((0.5 * TURN + 0.5) / STEP)
         angles = STEP * np.arange(-count, count + 1)
         f, _, rate = self.slices.heights(angles, strips)
@@ -92,7 +96,8 @@ class SlicedWheel:
 
 @jit
 def _reach(wheel, ex, turned, x, strips, first, f, rate, start, spacing, found):
-    """Fill ``found`` from heights of the wheel's sections, ``spacing`` apart, and their rates over the angle."""
+    """Fill ``found`` (see `reach_beyond`) from heights of the wheel's sections with a lateral ``spacing`` (m), and
+    their derivatives over the angle."""
     for k in range(strips.size):
         w = strips[k]
         at = (w - start) / spacing
@@ -104,7 +109,7 @@ def _reach(wheel, ex, turned, x, strips, first, f, rate, start, spacing, found):
         round_radius, centre = wheel.rolling_radius + own, (wheel.half_distance + w) * ex
         for n in range(x.size):
             d, radius, part = x[n] - centre, round_radius, 0.0
-            for _ in range(4):  # each step leaves d dR/dangle / R^2 of the one before: a thousandth
+            for _ in range(4):  # each step reduces the error by the factor d dR/dangle / R^2, about 0.001
                 place = (turned + math.asin(d / radius) - first) / STEP
                 q = min(max(int(place), 0), f.shape[0] - 2)
                 part = place - q
@@ -117,6 +122,6 @@ def _reach(wheel, ex, turned, x, strips, first, f, rate, start, spacing, found):
 
 @jit(allocates=False, forceinline=True)
 def _cubic(f, rate, q, j, part):
-    """Height between two angles."""
+    """Height interpolated by a cubic between two angles."""
     rise, m0, m1 = f[q + 1, j] - f[q, j], rate[q, j] * STEP, rate[q + 1, j] * STEP
     return f[q, j] + part * (m0 + part * (3.0 * rise - 2.0 * m0 - m1 + part * (m0 + m1 - 2.0 * rise)))

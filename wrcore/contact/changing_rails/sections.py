@@ -1,21 +1,20 @@
-"""A rail that changes along the track, as a wheel in a pose sees it: one section, ready for every search and patch.
+"""Equivalent section of a rail that changes along the track, for one position and attitude of the wheel.
 
-At each lateral coordinate the gap between the wheel of revolution and the rail's surface z(x, y) is least at some x,
-ahead of the axle where the rail rises. The seen section has the height that gives a prismatic rail the same least gap,
+At each lateral coordinate the gap between the wheel of revolution and the rail's surface z(x, y) has a minimum at some
+x, ahead of the axle where the rail rises. A prismatic rail with the equivalent section has the same minimum gap,
 
     f(y) = max_x (z_rail(x, y) - z_wheel(x, y)) + min_x z_wheel(x, y),
 
-which does not depend on the wheelset's height. What strips want beside it is kept at the section's nodes
-(`ContactGeometry.along`): how much further ahead the gap is least than over a prismatic rail, half of what the gap's
-second derivative over x has more, and how much higher the wheel's point there lies. Gap, place and curvature are those
-of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Where an overlap is of
-another length, its area counts. Over a rail that is the same everywhere the section is the rail's own and all three
-vanish.
+which does not depend on the wheelset's height. `ContactGeometry.along` has three corrections relative to a prismatic
+rail at the section's nodes: of the position x of the minimum gap, of half the gap's second derivative over x, and of
+the height of the wheel's point. Gap, position and curvature are those of the parabola that fits the gap best over the
+length of a patch, because strips assume parabolas. If the overlap has another length, its area is used. Over a rail
+with a constant section, the equivalent section is this section and all three corrections are 0.
 
-A wheel out of round is seen in the same way, see `wrcore.contact.changing_rails.out_of_round`.
+A wheel out of round is treated in the same way, see `wrcore.contact.changing_rails.out_of_round`.
 
-Where a head begins or ends under the wheel, its edge may be what is nearest; then the overlap that is there counts by
-its area. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
+Where a head begins or ends under the wheel, its edge may be nearest to the wheel; then the area of the overlap is used.
+If the wheel touches one line along the track at two points, only the nearer point is considered.
 """
 
 import math
@@ -35,20 +34,20 @@ from wrcore.geometry.track import SIDES
 from wrcore.kernels.jit import jit
 
 REACH, STEP, COARSE = 0.1, 1e-3, 4
-"""Half of the length along the track that is looked at, m: ramps up to 1:4.6 of a wheel of 460 mm; the distance of the
-sections there, m, and at every how many of them the wheel is first put."""
+"""Half length along the track that is evaluated, m, enough for ramps up to 1:4.6 under a wheel of 460 mm; spacing of
+the stations, m; ratio of the coarse spacing of the first search to it."""
 
 WINDOW = 5.5e-3
-"""Half of the length over which the gap is fitted, m: of a cubic gap the parabola feels w^2/3, and a pressure
-sqrt(1 - (x/a)^2) feels 3 a^2/7, as much for patches of 9.7 mm."""
+"""Half length over which a parabola is fitted to the gap, m. The effect of a cubic gap is w^2/3 in the fit, and
+3 a^2/7 under a pressure sqrt(1 - (x/a)^2): equal for patches of 9.7 mm."""
 
 USUAL_DEPTH, OTHER, ANOTHER = 6e-5, math.log(1.25), math.log(1.65)
-"""Depth (m) to which surfaces overlap under a wheel's usual load; and the ratio (logarithm) of that overlap's length to
-the fitted parabola's from which on its own area begins to count, and counts alone: on the chord of a fresh flat, say.
-"""
+"""Depth (m) of the overlap under a usual wheel load; logarithms of the ratio of this overlap's length to that of the
+fitted parabola from which the overlap's area is blended in, and from which only the area is used (as on the chord of a
+fresh flat)."""
 
 BELOW = 0.03
-"""Depth below the section's lowest point at which what lies between its heads is put, m."""
+"""Depth below the section's lowest point of the level between its heads, m."""
 
 HEIGHT, AHEAD, BEND, LIFT = range(4)
 
@@ -62,14 +61,13 @@ class WheelOnSlices:
     Parameters
     ----------
     wheel : ProfileCurve
-        Of a wheel out of round the profile of a wheel of revolution near it.
+        Profile of the wheel; for a wheel out of round, that of a similar wheel of revolution.
     rail : RailSlices
-        In the coordinates of the track: u from ``rail_distance``, f from the plane from which the wheelset's height
-        counts.
+        In the coordinates of the track: u from ``rail_distance``, f from the reference plane of the wheelset's height.
     rolling_radius, half_distance, rail_distance : float
         As for `WheelOnRail`, m.
     out_of_round : WheelSlices, optional
-        Of both wheels alike.
+        Shape of both wheels.
     """
 
     wheel: ProfileCurve
@@ -81,16 +79,17 @@ class WheelOnSlices:
 
     @cached_property
     def geometry_of_wheel(self):
-        """Geometry of the wheel over a level rail: what the search for the seen section takes of it."""
+        """Geometry of the wheel over a level rail, for the search for the equivalent section."""
         u = SPACING * np.arange(-400, 401)
         level = ProfileCurve("level", "rail", u, *np.zeros((3, u.size)))
         sizes = self.rolling_radius, self.half_distance, self.rail_distance
         return contact_geometry(self.wheel, level, *sizes)
 
     def under(self, side, s, y, roll=0.0, yaw=0.0, turned=0.0):
-        """`ContactGeometry` of the section that the wheel of a ``side`` sees with the wheelset's centre at s, y (m), in
-        a roll and yaw (rad), ``turned`` (rad) forward, and the height (m) of the centre at which it first touches; None
-        and NaN where there is no rail under the wheel."""
+        """Return the `ContactGeometry` of the equivalent section under one wheel, and the height (m) of first touch.
+
+        The wheelset's centre is at s, y (m), with ``roll`` and ``yaw`` (rad), its wheels turned forward by ``turned``
+        (rad). The height is that of the wheelset's centre. None and NaN if there is no rail under the wheel."""
         sign, wheel = SIDES[side], self.geometry_of_wheel
         pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
         low, high = (strip_point(wheel, pose, u)[0] for u in self._ends)
@@ -109,9 +108,10 @@ class WheelOnSlices:
         return geometry._replace(along=along, over=np.column_stack([x, over])), touch
 
     def straight(self, s, u):
-        """Sections (n, 4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees
-        with its cross-section at s (n,), multiples of `STEP` apart, m: rows `HEIGHT`, NaN where there is none, to
-        `LIFT`."""
+        """Equivalent sections (n, 4, m) of the rail for a centred wheelset at arc lengths ``s`` (n,), m.
+
+        ``u`` (m,) are equally spaced rail coordinates, m; steps of ``s`` are multiples of `STEP`. Rows are `HEIGHT`,
+        NaN without rail, to `LIFT`."""
         pose, seen = make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), np.zeros((s.size, 4, u.size))
         count = 2 * round(REACH / STEP) + 1
         every = self._where_parts_begin(s[0] - REACH + STEP * np.arange(round((s[-1] - s[0]) / STEP) + count))
@@ -125,9 +125,11 @@ class WheelOnSlices:
         return seen
 
     def turned(self, places, u, beyond):
-        """Sections (n, 4, m) over rail coordinates (m,) that the wheel of a wheelset in the middle sees of a level
-        rail at places (n,), where it reaches ``beyond(place, x, strips)``, (stations, m), its round, or the rail is as
-        much higher, at stations x and wheel coordinates ``strips``, m."""
+        """Equivalent sections (n, 4, m) of a level rail for a centred wheelset, at ``places`` (n,) of an irregularity.
+
+        ``u`` (m,) are rail coordinates, m. ``beyond(place, x, strips)`` returns by how much the wheel reaches further
+        down than the wheel of revolution, or the rail is higher, (stations, m), m, at stations ``x`` and wheel
+        coordinates ``strips``, m."""
         geometry, pose, x = self.geometry_of_wheel, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
         strips, seen = _strips_over(geometry, pose, u), np.zeros((places.size, 4, u.size))
         for place, section in zip(places, seen, strict=True):
@@ -136,8 +138,10 @@ class WheelOnSlices:
         return seen
 
     def strips(self, u):
-        """Of its strips over rail coordinates, for the same wheelset: 1/R (1/m), and what a small yaw (rad) moves their
-        points that touch ahead, less that of half the distance of the tape circles (m), (2, m)."""
+        """Return 1/R (1/m) of a centred wheelset's strips over rail coordinates ``u``, and their shift by yaw, (2, m).
+
+        The second row is the longitudinal displacement of the contact point per yaw (m/rad), minus half the distance of
+        the tape circles."""
         at = u + self.rail_distance - self.half_distance
         inside = np.clip(at, *self._ends)
         radius = self.rolling_radius - self.wheel(inside)
@@ -148,8 +152,10 @@ class WheelOnSlices:
         return self.wheel.u[0], self.wheel.u[-1]
 
     def _seen(self, pose, s, u, turned):
-        """Section (4, m) and height of the first touch in a pose of the wheel as a left one, turned forward (rad);
-        stations (n,) and heights of the rail (n, m) there, with what the wheel reaches beyond its round."""
+        """Return the equivalent section (4, m) and the height of first touch for a left wheel, turned forward (rad).
+
+        Further results: stations (n,), and heights of the rail (n, m), to which the irregularity of the wheel is
+        added."""
         x, beyond, seen = self._stations(s), np.zeros((0, 0)), np.zeros((4, u.size))
         rail = self.rail.heights(self._where_parts_begin(s + x), u)[0]
         if self.out_of_round is not None:
@@ -159,13 +165,13 @@ class WheelOnSlices:
         return seen, _see(self.geometry_of_wheel, pose, x, rail, beyond, u, seen), x, rail
 
     def _where_parts_begin(self, s):
-        """Arc lengths (n,), m, with those that miss the beginning of a part by rounding on it."""
+        """Return the arc lengths (n,), m, with those within rounding of the beginning of a part moved to it."""
         for begin in self.rail.begins():
             s = np.where(np.abs(s - begin) < _CLOSE, begin, s)
         return s
 
     def _stations(self, s):
-        """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
+        """Positions of the stations from the wheelset's cross-section, m; one is at the beginning of a part."""
         count = round(REACH / STEP)
         begins = self.rail.begins() - s
         begins = begins[np.abs(begins) < REACH]
@@ -174,8 +180,9 @@ class WheelOnSlices:
 
 
 def filled(f, spacing, floor):
-    """Heights over evenly spaced lateral coordinates, with a ``floor`` where there is no rail (NaN) or only a shred of
-    it, and slopes by differences of the fourth order."""
+    """Return heights over equally spaced lateral coordinates without gaps, and slopes by differences of fourth order.
+
+    The height is ``floor`` where there is no rail (NaN) or a piece of fewer than five nodes."""
     heights, slope = np.full(f.size, floor), np.zeros(f.size)
     ends = np.flatnonzero(np.diff(np.isfinite(f).astype(int), prepend=0, append=0)).reshape(-1, 2)
     for first, last in ends:
@@ -203,7 +210,7 @@ def _strip_over(wheel, pose, u):
 
 @jit
 def _strips_over(wheel, pose, u):
-    """Wheel coordinates of the strips over rail coordinates, m."""
+    """Wheel coordinates of the strips over the rail coordinates ``u``, m."""
     found = np.empty(u.size)
     for k in range(u.size):
         found[k] = _strip_over(wheel, pose, u[k])[0]
@@ -212,8 +219,10 @@ def _strips_over(wheel, pose, u):
 
 @jit(allocates=False)
 def _parabola(x, g, best):
-    """Vertex, height and second derivative of the parabola that fits best around its own vertex, with the weight
-    (1 - (d/WINDOW)^2)^2 at a distance d: smooth in what is fitted. From the highest station; NaN at an end."""
+    """Return vertex, height and second derivative of the parabola that fits ``g`` best around the vertex.
+
+    The weight (1 - (d/WINDOW)^2)^2 at a distance d makes the result a smooth function of ``g``. The iteration starts
+    at the highest station ``best``; NaN at an end."""
     n, h = x.size, x[1] - x[0]
     centre, top, second = x[best], np.nan, np.nan
     if best < 1 or best > n - 2 or not g[best - 1] + g[best + 1] == g[best - 1] + g[best + 1]:
@@ -250,8 +259,9 @@ def _parabola(x, g, best):
 
 @jit(allocates=False)
 def _usual_overlap(x, g, best, floor, low, high):
-    """Area (m^2) by which the gap is closed beyond a height ``floor``, from the station ``best`` on both ways within
-    those from ``low`` to ``high``, the middle of that area (m), and whether it ends there."""
+    """Return the area (m^2) of ``g`` above a height ``floor`` around the station ``best``, and its centroid x (m).
+
+    Only stations ``low`` to ``high`` are used. The third result is whether the area ends within them."""
     area, moment, ends = 0.0, 0.0, True
     for way in (-1, 1):
         i = best
@@ -269,8 +279,10 @@ def _usual_overlap(x, g, best, floor, low, high):
 
 @jit(allocates=False)
 def _of_area(place, second, area, middle):
-    """Vertex and second derivative of a parabola, or, where the overlap of the usual depth is another one, of the
-    parabola of its ``area`` (m^2) about its ``middle`` (m)."""
+    """Return vertex and second derivative of a parabola, blended with those of a parabola with the ``area`` (m^2).
+
+    The blending begins where the length of the overlap at the usual depth differs from that of the fitted parabola. The
+    second parabola has its vertex at ``middle`` (m)."""
     if not area > 0.0:
         return place, second
     half = 0.75 * area / USUAL_DEPTH
@@ -283,8 +295,9 @@ def _of_area(place, second, area, middle):
 
 @jit(allocates=False)
 def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
-    """Fill ``g`` with the height of the rail less that of the wheel at every ``step``-th station, NaN where one of them
-    is missing; returns the highest one, or -1."""
+    """Fill ``g`` with the height of the rail minus that of the wheel at every ``step``-th station.
+
+    NaN where one of them is missing. Returns the station with the maximum, or -1."""
     best = -1
     for i in range(first, end, step):
         g[i] = np.nan
@@ -299,9 +312,10 @@ def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
 
 @jit
 def _see(wheel, pose, x, rail, beyond, u, seen):
-    """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,), and what of
-    them is the wheel reaching ``beyond`` its round (n, m; empty: nothing); returns the height of the wheelset's centre
-    at the first touch. Stations are evenly apart."""
+    """Fill the equivalent section ``seen`` (4, m) over rail coordinates ``u`` (m,); return the height of first touch.
+
+    ``rail`` (n, m) are heights of the rail at equally spaced stations ``x`` (n,). ``beyond`` (n, m; or empty) is the
+    part of them that is due to a wheel out of round. The height is that of the wheelset's centre, m."""
     n, h, touch = x.size, x[1] - x[0], np.nan
     g, nominal, near = np.full(n, np.nan), -wheel.rolling_radius, 2 * int(WINDOW / h) + COARSE
     for k in range(u.size):
