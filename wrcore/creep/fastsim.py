@@ -1,4 +1,4 @@
-"""FASTSIM: Kalker's simplified theory, in which a point's elastic displacement follows its own traction only.
+"""FASTSIM: Kalker's simplified theory, in which the elastic displacement of a point depends only on its traction.
 
 References
 ----------
@@ -18,7 +18,7 @@ class FastsimData(NamedTuple):
 
     n_x: int
     n_y: int
-    """Steps along a strip, strips."""
+    """Number of steps along a strip, and number of strips."""
     elliptic: int
     """0: bound of the traction parabolic in x and y (Kalker's choice); 1: Hertzian."""
 
@@ -28,9 +28,9 @@ def fastsim(settings, kalker, g, psi, xi, eta, phi):
     """Creep force fx, fy, mz, over mu N and mu N c, by FASTSIM with three flexibilities; arguments as for `laws`.
 
     Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
-    lateral and spin creepage; the traction starts at zero at the leading edge, follows s = 0 and is cut back to its
-    bound where it exceeds it. An SDEC patch takes the flexibilities of its mean ellipse. The bound is scaled to carry
-    mu N over the cells, whose midpoints find some 1e-4 more: no force is larger."""
+    lateral and spin creepage. The traction is 0 at the leading edge, follows from s = 0, and is reduced to its bound
+    where it exceeds it. An SDEC patch has the flexibilities of its mean ellipse. The bound is scaled to a sum of mu N
+    over the cells (the midpoint rule gives about 1e-4 more), so that no force is larger."""
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
     rate_x, rate_y = xi * 3 * c11 / (8 * a), eta * 3 * c22 / (8 * a)

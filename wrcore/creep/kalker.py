@@ -2,9 +2,9 @@
 
     fx = -C11 xi',   fy = -C22 eta' - C23 phi',   mz = +C23 eta' - C33 phi'
 
-in the nondimensional form of the package (`halfspace.RollingContact`), i.e. Fx = -G a b C11 xi and so on. The
-coefficients come from this package's own half-space operator with adhesion everywhere, extrapolated in the panel
-size, on a grid of a/b and nu: ``kalker_coefficients.csv`` beside this file, made by ``tests/creep/kalker_grid.py``.
+in the nondimensional form of `wrcore.contact.rolling.ellipse.RollingContact`, i.e. Fx = -G a b C11 xi and so on. The
+coefficients were computed by wrcore's half-space solver with full adhesion, extrapolated in the panel size, on a grid
+of a/b and nu. They are in ``kalker_coefficients.csv`` in this folder, written by ``tests/creep/kalker_grid.py``.
 
 References
 ----------
@@ -37,7 +37,7 @@ class KalkerData(NamedTuple):
 
 
 def kalker_data(nu):
-    """`KalkerData` for one Poisson's ratio, 0 to 0.5, by the polynomial in it through all stored values."""
+    """Return the `KalkerData` for one Poisson's ratio, 0 to 0.5, by polynomial interpolation of the stored values."""
     if not 0 <= nu <= 0.5:
         raise ValueError(f"Poisson's ratio: expected 0 to 0.5, got {nu}")
     text = files("wrcore.creep").joinpath(COEFFICIENTS_FILE).read_text(encoding="utf-8")
@@ -53,7 +53,7 @@ def kalker_data(nu):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def coefficients_at(log_g, data):
-    """C11, C22, C23, C33 at ln(a/b); outside the stored range the value at its end."""
+    """Return C11, C22, C23, C33 at ln(a/b); outside the stored range, the values at its end."""
     cells = data.cubic.shape[0]
     position = (log_g - data.start) / data.spacing
     position = min(position, float(cells)) if position > 0 else 0.0
@@ -69,5 +69,5 @@ def coefficients_at(log_g, data):
 
 @jit(allocates=False, forceinline=True)
 def kalker_coefficients(g, data):
-    """C11, C22, C23, C33 at a/b = g; outside 1/32..32 the values at the end of the range."""
+    """Return C11, C22, C23, C33 at a/b = g; outside 1/32..32, the values at the end of the range."""
     return coefficients_at(np.log(g), data)
