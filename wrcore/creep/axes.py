@@ -1,21 +1,21 @@
-"""Axes of the creep table, and the look-up: quadratic B-splines in up to five inputs.
+"""Axes and interpolation of the creep table: quadratic B-splines in up to five inputs.
 
-Creepages w = (xi', eta', phi') become a direction and a distance from zero creepage,
+Creepages w = (xi', eta', phi') are converted to a direction and a distance from zero creepage,
 
     X = xi' C11/3,   Y = eta' C22/3,   P = phi' l C11/3,   l = LEVER (sqrt(g) + 1/sqrt(g))
     alpha = atan2(Y, X),   beta = atan2(P, hypot(X, Y)),
     r^2 = X^2 + Y^2 + phi'^2 ((C23/1.5)^2 + SPIN_FLOOR^2),   t = k r/(1 + k r),   k = RATE sqrt(1 + WIDE b/a),
 
-beside ln(a/b) and abs(psi); nodes are equally spaced in all of them but t (see `_stretch`). Along a ray t runs from
-zero creepage (0) to full slip (1), where the force is smooth; polar axes are needed because across zero creepage it is
-not (it has a term r abs(r)). Stored is what remains of the force beside its linear part,
+and the further axes are ln(a/b) and abs(psi). Nodes are equally spaced on all axes except t (see `_stretch`). In a
+given direction t increases from zero creepage (0) to full slip (1), and the force is a smooth function of t. Polar axes
+are needed because the force has a term r abs(r) at zero creepage. The table stores the remainder R of the force,
 
     F = (1 - t)^2 F_lin(w) + t R(g, psi, t, alpha, beta),      F_lin from `kalker`,
 
-so that the slope at zero creepage is Kalker's exactly: R = 0 at t = 0 for the ellipse. Symmetries are used, not
-approximated: F(-w) = -F(w) leaves beta >= 0, and mirroring y leaves psi >= 0 and, for the ellipse, xi >= 0.
-R is the tensor product of quadratic B-splines that interpolates the nodes (beside the spin axis nearly so, see
-`build.spline_coefficients`): once continuously differentiable, three taps per axis.
+so that the derivatives at zero creepage are exactly Kalker's: R = 0 at t = 0 for the ellipse. Symmetries hold exactly:
+F(-w) = -F(w) restricts the table to beta >= 0; mirroring y restricts it to psi >= 0 and, for the ellipse, xi >= 0. R is
+a tensor product of quadratic B-splines that interpolates the nodes (approximately near the spin axis, see
+`build.spline_coefficients`). It is once continuously differentiable and uses three coefficients per axis.
 """
 
 from typing import NamedTuple
@@ -51,23 +51,23 @@ class TableAxes(NamedTuple):
     n_t: int
     n_alpha: int
     n_beta: int
-    """Nodes; alpha: on the full circle (even), beta: from 0 to pi/2 with both ends."""
+    """Numbers of nodes; alpha: on the full circle (even), beta: from 0 to pi/2 with both ends."""
 
 
 class CreepTableData(NamedTuple):
-    """A creep table as kernels want it."""
+    """Creep table for kernels."""
 
     axes: TableAxes
     kalker: KalkerData
     """Coefficients for the table's Poisson's ratio."""
     coefficients: np.ndarray
-    """(n,) float32: B-spline coefficients in the order g, psi, t, alpha, beta, output; one ghost on either side of each
-    axis (none for psi in the plane of ellipses, whose alpha covers only -pi/2..pi/2); outputs fx, fy, mz, 0."""
+    """(n,) float32: B-spline coefficients in the order g, psi, t, alpha, beta, output; one extra coefficient on either
+    side of each axis (none for psi in a table of ellipses, whose alpha covers -pi/2..pi/2); outputs fx, fy, mz, 0."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _atan(z):
-    """atan for 0 <= z <= 1 within 1e-8; exact at 1, so that `_atan2` has no step (nor a kink: slope 1/2 there)."""
+    """Return atan z for 0 <= z <= 1 with an error of 1e-8; value and slope are exact at 1, so that `_atan2` is C1."""
     s = z * z
     s2 = s * s
     low = -0.33332972964484753 + 0.19990074492491161 * s + s2 * (-0.14183326803556859 + 0.10563281351540649 * s)
@@ -78,7 +78,7 @@ def _atan(z):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _atan2(y, x):
-    """Angle of (x, y) in -pi..pi within 1e-7; 0 at the origin."""
+    """Angle of (x, y) in -pi..pi with an error of 1e-7; 0 at the origin."""
     ax, ay = abs(x), abs(y)
     large, small = max(ax, ay), min(ax, ay)
     angle = _atan(small / (large + 1e-300))
@@ -89,7 +89,7 @@ def _atan2(y, x):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scales(g, c11, c22, c23):
-    """Factors of xi', eta', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
+    """Return the factors of xi', eta', phi' in the direction, of phi' in the distance, and k (formulas: see above)."""
     root = np.sqrt(g)
     inverse = 1 / root
     lever = LEVER * (root + inverse)
@@ -100,25 +100,25 @@ def scales(g, c11, c22, c23):
 
 @jit(forceinline=True, fastmath=FUSED)
 def _bend(far, whole):
-    """What the stretched axis adds to t = far/whole; as a fraction, so that the root need not wait for the division."""
+    """Nonlinear part of the stretched axis at t = far/whole; a fraction, so that root and division run in parallel."""
     d, width = far - PEAK * whole, PEAK_WIDTH * whole
     return PEAK_WIDTH * (d / np.sqrt(d * d + width * width) - _PEAK_LOW)
 
 
 @jit(forceinline=True, fastmath=FUSED)
 def _stretch(t):
-    """Position along t, 0 to 1: up to twice as many nodes around PEAK, where spin saturates with a sharp bend."""
+    """Position of t on the axis, 0 to 1, with up to twice as many nodes around PEAK, where spin saturates sharply."""
     return (t + _bend(t, 1.0)) * _STRETCH
 
 
 def node_distances(n_t):
-    """Values of t at equally spaced positions."""
+    """Values of t at ``n_t`` equally spaced positions on the stretched axis."""
     t = np.linspace(0, 1, 20001)
     return np.interp(np.linspace(0, 1, n_t), _stretch(t), t)
 
 
 def creepages_at(g, t, alpha, beta, kalker):
-    """Inverse of the axes: creepages xi', eta', phi' (..., 3) of nodes t < 1, alpha, beta of equal shape at g = a/b."""
+    """Return the creepages xi', eta', phi' (..., 3) at nodes t < 1, alpha, beta of equal shape for g = a/b."""
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
     direction = np.stack([np.cos(beta) * np.cos(alpha) / sx, np.cos(beta) * np.sin(alpha) / sy, np.sin(beta) / sp], -1)
@@ -128,7 +128,8 @@ def creepages_at(g, t, alpha, beta, kalker):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _taps(position, last):
-    """Nearest node and the three quadratic B-spline weights at a position in node spacings, clamped to 0..last."""
+    """Return the nearest node and three quadratic B-spline weights at a position in node spacings, limited to
+    0..last."""
     position = min(position, float(last)) if position > 0 else 0.0
     node = int(position + 0.5)
     f = position - node
@@ -137,28 +138,30 @@ def _taps(position, last):
 
 @jit(allocates=False, forceinline=True)
 def _line(c, start, wb):
-    """Sum over three neighbours in beta, of all four outputs."""
+    """Weighted sum over three neighbours in beta, of all four outputs."""
     return wb[0] * load4(c, start) + wb[1] * load4(c, start + np.uint64(4)) + wb[2] * load4(c, start + np.uint64(8))
 
 
 @jit(allocates=False, forceinline=True)
 def _plane(c, start, row, wa, wb):
-    """The same over three lines along alpha (stride ``row``)."""
+    """Weighted sum over 3 x 3 neighbours in alpha (stride ``row``) and beta."""
     one, two, three = _line(c, start, wb), _line(c, start + row, wb), _line(c, start + row + row, wb)
     return wa[0] * one + wa[1] * two + wa[2] * three
 
 
 @jit(allocates=False, forceinline=True)
 def _solid(c, start, row, layer, wt, wa, wb):
-    """The same over three planes along t (stride ``layer``)."""
+    """Weighted sum over 3 x 3 x 3 neighbours in t (stride ``layer``), alpha and beta."""
     one, two = _plane(c, start, row, wa, wb), _plane(c, start + layer, row, wa, wb)
     return wt[0] * one + wt[1] * two + wt[2] * _plane(c, start + layer + layer, row, wa, wb)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def table_lookup(table, log_g, g, psi, xi, eta, phi):
-    """Creep force fx, fy, mz from the table, over mu N and mu N c, and 1 where a/b or psi lay outside its range: then
-    the nearest patch inside is taken. Creepages that are not finite give NaN and the flag."""
+    """Creep force fx, fy, mz from the table, over mu N and mu N c, and a flag.
+
+    The flag is 1 if a/b or psi is outside the range of the table; the nearest patch inside is then used. For creepages
+    that are not finite the forces are NaN and the flag is 1."""
     axes, c = table.axes, table.coefficients
     if not abs(log_g + psi + xi + eta + phi) < np.inf:
         return np.nan, np.nan, np.nan, 1
@@ -169,7 +172,7 @@ def table_lookup(table, log_g, g, psi, xi, eta, phi):
         g = np.exp(log_g)
     if abs(psi) > axes.psi_max:
         outside = 1
-    # mirror y (psi >= 0), then turn all creepages round (phi >= 0), then, for the ellipse, mirror again (xi >= 0)
+    # mirror y (psi >= 0), then reverse all creepages (phi >= 0), then, for the ellipse, mirror again (xi >= 0)
     flip_y = -1.0 if psi < 0 else 1.0
     flip = -1.0 if flip_y * phi < 0 else 1.0
     xi, eta, phi = flip * xi, flip * flip_y * eta, flip * flip_y * phi

@@ -1,4 +1,4 @@
-"""Fill the nodes of a creep table with exact solutions and turn them into B-spline coefficients."""
+"""Computation of creep tables: solutions of rolling contact at the nodes, and their B-spline coefficients."""
 
 import math
 from typing import NamedTuple
@@ -16,7 +16,7 @@ ROUNDED = 9
 
 
 class Resolution(NamedTuple):
-    """Node counts of the axes and level of the exact solver (``n_psi`` is ignored in the plane of ellipses)."""
+    """Numbers of nodes of the axes and level of the half-space solver; ``n_psi`` is not used in a table of ellipses."""
 
     n_g: int
     n_psi: int
@@ -40,11 +40,12 @@ RESOLUTIONS = {
         (0.0035, Resolution(10, 4, 20, 20, 16, 20)),
     ),
 }
-"""From coarse to fine, each with a bound that the 99 % quantile of its force error was found to keep."""
+"""Resolutions from coarse to fine, each after an upper bound of the measured 99 % quantile of its force error over
+mu N."""
 
 
 def table_axes(planes, resolution):
-    """Axes of a table of ``planes`` "ellipse" or "sdec" with the node counts of ``resolution``."""
+    """Return the axes of a table of ``planes`` "ellipse" or "sdec" with the numbers of nodes of ``resolution``."""
     n_psi, psi_max = (1, 0.0) if planes == "ellipse" else (resolution.n_psi, PSI_MAX)
     low, high = np.log(A_OVER_B)
     return TableAxes(
@@ -54,7 +55,7 @@ def table_axes(planes, resolution):
 
 
 def count_cases(axes):
-    """Creep force problems solved for a table (t = 0 and directions that symmetry gives are not solved)."""
+    """Number of rolling problems solved for a table, without t = 0 and without directions known by symmetry."""
     half = axes.n_alpha // 2 + 1
     ellipse = (axes.n_t - 1) * (half * (axes.n_beta - 1) + 1)
     skewed = (axes.n_t - 1) * (axes.n_alpha * (axes.n_beta - 1) + 1)
@@ -62,7 +63,7 @@ def count_cases(axes):
 
 
 def axis_values(axes):
-    """Node values (ln(a/b), psi, t, alpha, beta) of the axes; alpha on the full circle from -pi."""
+    """Return the nodes of the axes ln(a/b), psi, t, alpha, beta; alpha on the full circle from -pi."""
     return (
         np.linspace(axes.log_g_min, axes.log_g_max, axes.n_g), np.linspace(0, axes.psi_max, axes.n_psi),
         node_distances(axes.n_t), 2 * np.pi * np.arange(axes.n_alpha) / axes.n_alpha - np.pi,
@@ -71,7 +72,7 @@ def axis_values(axes):
 
 
 def _directions(axes, ellipse):
-    """Node indices (alpha, beta) that must be solved: xi >= 0 for the ellipse, the pole once."""
+    """Return the node indices (alpha, beta) of directions to be solved: xi >= 0 for the ellipse, the pole once."""
     a, b = np.meshgrid(np.arange(axes.n_alpha), np.arange(axes.n_beta), indexing="ij")
     quarter = axes.n_alpha // 4
     wanted = (b < axes.n_beta - 1) | (a == axes.n_alpha // 2)
@@ -85,7 +86,7 @@ def _kalker_matrix(c11, c22, c23, c33):
 
 
 def _fill(axes, ellipse, alpha_index, beta_index, values):
-    """Spread solved directions (n_t, m, 3) over all of (n_t, n_alpha, n_beta, 3) by symmetry."""
+    """Return values at all nodes (n_t, n_alpha, n_beta, 3) from solved directions (n_t, m, 3) by symmetry."""
     full = np.empty((values.shape[0], axes.n_alpha, axes.n_beta, 3))
     full[:, alpha_index, beta_index] = values
     if ellipse:
@@ -93,13 +94,13 @@ def _fill(axes, ellipse, alpha_index, beta_index, values):
         inside = beta_index < axes.n_beta - 1
         full[:, mirrored[inside], beta_index[inside]] = values[:, inside] * [-1, 1, 1]
     full[:, :, -1] = full[:, axes.n_alpha // 2, -1][:, None]
-    # without spin the turned direction is a node too: solved apart, it agrees to the solver's tolerance only
+    # without spin the reversed direction is a node too; its separate solution agrees only within the tolerance
     full[:, :, 0] = (full[:, :, 0] - np.roll(full[:, :, 0], axes.n_alpha // 2, axis=1)) / 2
     return full
 
 
 def patch_remainder(axes, log_g, psi, kalker, level):
-    """R (n_t, n_alpha, n_beta, 3) at all nodes of a patch (see `axes`): solve, less the linear part, divided by t."""
+    """Remainder R (n_t, n_alpha, n_beta, 3; see `axes`) at all nodes of a patch: force minus linear part, over t."""
     g, ellipse = np.exp(log_g), psi == 0
     contact = RollingContact(g, psi, kalker.nu, level)
     alpha_index, beta_index = _directions(axes, ellipse)
@@ -120,8 +121,9 @@ def patch_remainder(axes, log_g, psi, kalker, level):
 
 
 def _interpolation(n, periodic):
-    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node. Periodic: (n, n). Else
-    (n + 2, n) with a vanishing third difference of the coefficients at either end."""
+    """Return the matrix from node values to quadratic B-spline coefficients, which are (1/8, 6/8, 1/8) at each node.
+
+    Its shape is (n, n) if periodic, else (n + 2, n), with a third difference of the coefficients of 0 at either end."""
     if periodic:
         rows = 0.75 * np.eye(n) + 0.125 * (np.roll(np.eye(n), 1, 0) + np.roll(np.eye(n), -1, 0))
         return np.linalg.inv(rows)
@@ -137,15 +139,17 @@ def _along(matrix, values, axis):
 
 
 def _overtones(n):
-    """Matrix (n, n) that keeps the third and higher odd harmonics of values equally spaced on a circle."""
+    """Return the matrix (n, n) for the third and higher odd harmonics of values equally spaced on a circle."""
     step = np.arange(n) - np.arange(n)[:, None]
     odd = (np.eye(n) - np.roll(np.eye(n), n // 2, axis=1)) / 2
     return odd - 2 / n * np.cos(2 * np.pi * step / n)
 
 
 def _flat_at_pole(n):
-    """Matrix (n + 2, n) from values of odd harmonics along beta to coefficients that end with no value and no slope.
-    They are even about beta = 0. Of the two nodes nearest to the pole the values are not used."""
+    """Return the matrix (n + 2, n) from values of odd harmonics over beta to coefficients with value and slope 0 at
+    the pole.
+
+    The coefficients are even about beta = 0. The values at the two nodes nearest to the pole are not used."""
     inner = n - 2
     rows = 0.75 * np.eye(inner) + 0.125 * (np.eye(inner, k=1) + np.eye(inner, k=-1))
     rows[0, 1] *= 2
@@ -156,7 +160,7 @@ def _flat_at_pole(n):
 
 
 def _meridians(values):
-    """Coefficients with ghosts along beta: each meridian goes on beyond the pole and beyond beta = 0 by symmetry."""
+    """Return the coefficients over beta, with extra ones at the ends by symmetry about the pole and beta = 0."""
     n_alpha, n_beta = values.shape[3:5]
     opposite = np.roll(values, -n_alpha // 2, axis=3)[..., -2:0:-1, :]
     circle = np.concatenate([values, opposite, -values, -opposite], axis=4)
@@ -165,20 +169,21 @@ def _meridians(values):
 
 
 def _mirror_psi(values):
-    """R at -psi: mirrored in y and turned round, (fx, fy, mz)(alpha) -> (-fx, fy, mz)(pi - alpha)."""
+    """Return R at -psi: mirrored in y and reversed, (fx, fy, mz)(alpha) -> (-fx, fy, mz)(pi - alpha)."""
     n_alpha = values.shape[3]
     index = (n_alpha // 2 - np.arange(n_alpha)) % n_alpha
     return values[:, :, :, index] * [-1, 1, 1]
 
 
 def spline_coefficients(values):
-    """B-spline coefficients, with ghosts, of R at the nodes (n_g, n_psi, n_t, n_alpha, n_beta, 3), flattened as
-    `CreepTableData` wants them and rounded to 1e-9, so that rounding in a matrix product neither breaks a symmetry nor
-    tells two builds apart.
+    """Return the B-spline coefficients of R, given at the nodes (n_g, n_psi, n_t, n_alpha, n_beta, 3).
 
-    At the spin axis, the pole of (alpha, beta), a smooth force has a slope that goes with cos(alpha) and sin(alpha).
-    Interpolation alone gives it overtones, too, and with them slopes that turn within any small distance of the axis.
-    They are held flat there, at the price of node values that are off by up to 0.2 % of mu N beside the pole."""
+    They are flattened for `CreepTableData`, with extra ones at the ends of axes. They are rounded to 1e-9, so that
+    rounding in matrix products does not break a symmetry and two builds have equal coefficients.
+
+    At the spin axis, the pole of (alpha, beta), the slope of a smooth force varies as cos(alpha) and sin(alpha).
+    Interpolation adds higher harmonics, whose slopes change direction within any small distance of the axis. Their
+    value and slope are set to 0 there, which causes errors of up to 0.2 % of mu N at nodes near the pole."""
     n_g, n_psi, n_t, n_alpha, n_beta, _ = values.shape
     c = _along(_interpolation(n_g, False), values, 0)
     c = _along(_interpolation(n_t, False), c, 2)
@@ -198,8 +203,9 @@ def spline_coefficients(values):
 
 
 def build_data(nu, planes, resolution, progress=None):
-    """Solve all nodes of a table for Poisson's ratio ``nu`` and ``planes`` ("ellipse" or "sdec") and interpolate: its
-    CreepTableData. ``progress`` wraps the list of patches."""
+    """Solve all nodes of a table and return its `CreepTableData`.
+
+    ``nu`` is Poisson's ratio, ``planes`` "ellipse" or "sdec"; ``progress`` wraps the list of patches."""
     axes, kalker = table_axes(planes, resolution), kalker_data(nu)
     log_g, psi, *_ = axis_values(axes)
     values = np.empty((axes.n_g, axes.n_psi, axes.n_t, axes.n_alpha, axes.n_beta, 3))
@@ -210,7 +216,7 @@ def build_data(nu, planes, resolution, progress=None):
 
 
 def random_creepages(g, count, kalker, rng):
-    """Creepages from small to beyond saturation: a third each without spin, pure spin, mixed.
+    """Random creepages from small ones to beyond saturation: one third each without spin, with pure spin, and mixed.
 
     With X = xi' C11/3, Y = eta' C22/3, spin phi' C23: abs(X, Y) log-uniform 0.03..3, spin log-uniform 0.03..5."""
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
@@ -221,8 +227,10 @@ def random_creepages(g, count, kalker, rng):
 
 
 def random_errors(data, level, patches=48, per_patch=40, seed=0):
-    """Errors of the table against the exact solver, of (fx, fy) as a vector's length and of mz, (patches per_patch,)
-    each, at patches drawn uniformly over its range of ln(a/b) and psi with random creepages on each."""
+    """Return errors of the table relative to the half-space solver at random cases, (patches per_patch,) each.
+
+    They are the length of the error vector of (fx, fy), and the error of mz. Patches are drawn uniformly over the range
+    of ln(a/b) and psi, with random creepages on each."""
     rng, axes = np.random.default_rng(seed), data.axes
     force, moment = [], []
     for _ in range(patches):

@@ -1,4 +1,4 @@
-"""Creep forces of a list of cases in SI units: the work behind ``wrcore creep``."""
+"""Creep forces of a list of cases in SI units, for ``wrcore creep``."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ MODELS = (*LAWS, "exact")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
 NUMBERS = (*POSITIVE, "nu", "xi", "eta", "phi_per_m")
 OTHER_NAMES = {"ux": "xi", "uy": "eta"}
-"""Columns that are read, too, where the usual ones are missing."""
+"""Alternative names of columns, used if the usual columns are missing."""
 
 FORCES = ("Fx_N", "Fy_N", "Mz_Nm")
 
 _OPEN: dict[tuple[float, str], CreepTable] = {}
 _SAME_NU = 1e-9
 _LARGEST = 1e100
-"""Nondimensional creepages above this are beyond what the laws' squares can hold."""
+"""Maximum nondimensional creepage; the squares of larger ones could overflow."""
 
 
 def read_cases(path):
@@ -39,8 +39,10 @@ def read_cases(path):
 
 
 def check_cases(frame, source="cases"):
-    """Columns a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m of a case list, which has a
-    case_id, too, as arrays of floats by name. InputError names ``source`` and the column and row (from 1) at fault."""
+    """Check a case list and return its columns as arrays of floats by name.
+
+    Columns: case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m; case_id is not returned.
+    InputError names ``source`` and the wrong column and row (from 1)."""
     frame = frame.rename(columns={other: name for other, name in OTHER_NAMES.items() if name not in frame})
     missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
     if missing:
@@ -67,8 +69,9 @@ def _refuse(bad, values, name, source, expected):
 
 
 def nondimensional(columns):
-    """g, psi (n,), creepages xi', eta', phi' (n, 3) as the laws take them, and c = sqrt(a b) (n,), m, with b the mean
-    of b_neg and b_pos, from columns that `check_cases` returns."""
+    """Return g, psi (n,), nondimensional creepages xi', eta', phi' (n, 3), and c = sqrt(a b) (n,), m.
+
+    ``columns`` come from `check_cases`; b is the mean of b_neg and b_pos."""
     b = (columns["b_neg_m"] + columns["b_pos_m"]) / 2
     psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
     c = np.sqrt(columns["a_m"] * b)
@@ -78,12 +81,12 @@ def nondimensional(columns):
 
 
 def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, source=None):
-    """Table case_id, Fx_N, Fy_N, Mz_Nm of the cases of a list (see `check_cases`) by ``model`` (of MODELS), in their
-    order; of an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of its bounding box.
+    """Return a table case_id, Fx_N, Fy_N, Mz_Nm of the cases of a list (see `check_cases`) by ``model`` (of MODELS).
 
-    ``table`` (CreepTable or path): for the model "table"; by default the cached one for each nu, built if need be.
-    ``level``: refinement of the model "exact". ``progress`` wraps the iterable of patches, ``source`` is named in
-    messages. ``attrs`` counts cases ``out_of_range`` of the law's data and exact solutions ``not_converged``."""
+    For an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of its bounding box. ``table``
+    (CreepTable or path): for the model "table"; by default the cached table for each nu, built if missing. ``level``:
+    refinement of the model "exact". ``progress`` wraps the iterable of patches, ``source`` is named in messages.
+    ``attrs`` has the numbers of cases ``out_of_range`` of the law's data and of solutions ``not_converged``."""
     import pandas as pd
 
     source = source or frame.attrs.get("source", "cases")
@@ -96,8 +99,8 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
 
 
 def _solved(columns, model, table, level, progress, source):
-    """Forces and moment (n, 3), N and N m, of checked columns, and what was counted; as for `solve_cases`."""
-    with np.errstate(all="ignore"):  # what overflows is refused
+    """Return forces and moment (n, 3), N and N m, for checked columns, and the counts of `solve_cases`."""
+    with np.errstate(all="ignore"):  # overflows are refused below
         g, psi, creepages, c = nondimensional(columns)
     size = np.abs(creepages).max(axis=1, initial=0.0)
     expected = f"creepages times G a b/(mu N) of at most {_LARGEST:g}"
@@ -111,7 +114,7 @@ def _solved(columns, model, table, level, progress, source):
 
 
 def _exact(g, psi, nu, creepages, level, progress):
-    """Exact forces; cases on the same patch share its operator."""
+    """Return nondimensional forces by the half-space solver, and counts; cases on the same patch share its operator."""
     forces, failed = np.empty_like(creepages), 0
     patches, member = np.unique(np.round(np.stack([g, psi, nu], axis=1), 12), axis=0, return_inverse=True)
     for index in progress(range(len(patches))) if progress else range(len(patches)):
@@ -123,7 +126,7 @@ def _exact(g, psi, nu, creepages, level, progress):
 
 
 def _by_law(model, g, psi, nu, creepages, table, progress, source):
-    """Forces by a law of `laws`, group by group of equal nu."""
+    """Return nondimensional forces by a law of `laws`, and counts; cases with equal nu are solved together."""
     forces, outside = np.empty_like(creepages), 0
     given = table if table is None or isinstance(table, CreepTable) else load_table(table)
     planes = "sdec" if np.any(psi != 0) else "ellipse"
@@ -141,7 +144,7 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
 
 
 def _open_table(nu, planes, progress):
-    """The usual table for a Poisson's ratio, read once."""
+    """Return the default table for a Poisson's ratio, read once and cached."""
     if (nu, planes) not in _OPEN:
         _OPEN[nu, planes] = ensure_table(nu, planes, DEFAULT_TOLERANCE, progress)
     return _OPEN[nu, planes]
@@ -162,24 +165,24 @@ def creep_force(
     table: CreepTable | str | PathLike[str] | None = None,
     psi: Annotated[ArrayLike, Within(-1.0 + 1e-6, 1.0 - 1e-6)] = 0.0,
 ) -> tuple[Any, Any, Any]:
-    """Creep force of any law in physical units; scalars and arrays broadcast.
+    """Compute the creep force by any law in physical units; scalars and arrays broadcast.
 
     Parameters
     ----------
     model : {"table", "linear", "she", "polach", "fastsim", "exact"}
     a, b : float or array_like
-        Semi-axes along and across rolling, m.
+        Semi-axes in the rolling direction and across, m.
     normal_force : float or array_like
-        N.
+        Normal force, N.
     xi, eta, phi : float or array_like
         Longitudinal and lateral creepage (1) and spin (1/m), of the wheel relative to the rail.
     mu, shear_modulus, nu : float or array_like
         Friction coefficient, shear modulus (Pa), Poisson's ratio.
     table : CreepTable or path, optional
-        For the model "table"; left out: the cached table for nu, built first if need be, and read once.
+        For the model "table"; by default the cached table for nu, which is built if missing, and read once.
     psi : float or array_like
-        Shape number of a double ellipse, which spans ``b (1 + psi)`` to the left and ``b (1 - psi)`` to the right; of
-        an ellipse 0. Only "table", "exact" and "fastsim" know it.
+        Shape number of a double ellipse, which spans ``b (1 + psi)`` to the left and ``b (1 - psi)`` to the right; 0
+        for an ellipse. Only "table", "exact" and "fastsim" depend on it.
 
     Returns
     -------
@@ -189,7 +192,7 @@ def creep_force(
     Raises
     ------
     InputError
-        For an unknown model or a value that is not possible.
+        For an unknown model or an invalid value.
 
     Examples
     --------

@@ -1,11 +1,11 @@
-"""Creep tables on disk: built to a wanted error when first needed, cached, loaded in milliseconds.
+"""Creep tables on disk: built to a given error when first needed, cached, loaded in milliseconds.
 
-The default table comes with the package (``tables/``): a scene that asks for nothing else builds none. Names of files
-hold `FORM`: tables of another form are not found.
+The default table is part of the package (``tables/``); other tables are built when a scene needs them. File names
+contain `FORM`, so that tables of another form are not used.
 
-A table holds Fx, Fy, Mz of steady rolling for one Poisson's ratio, either for ellipses (four inputs) or for SDEC
-patches (five). Its error is measured, not assumed: random patches and creepages are solved exactly and compared, and a
-finer table is built until the 99 % quantile of the force error is below the tolerance. The numbers stay in the file.
+A table contains Fx, Fy, Mz of steady rolling for one Poisson's ratio, either for ellipses (four inputs) or for SDEC
+patches (five inputs). Its error is measured relative to the half-space solver at random patches and creepages. Finer
+tables are built until the 99 % quantile of the force error is below the tolerance. The errors are stored in the file.
 """
 
 from __future__ import annotations
@@ -32,38 +32,38 @@ from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import table_folder, warn
 
 DEFAULT_TOLERANCE = 0.005
-"""Error of a table that nobody asked another of. A critical speed depends on it more than on the detection: that of the
-trailer vehicle is 74.95 m/s at 0.015, 74.92 at 0.007 and 74.94 at 0.005; planar detection changes it by 0.0015 m/s."""
+"""Default error of a table, over mu N. Critical speeds depend more on it than on the detection: that of the trailer
+vehicle is 74.95 m/s at 0.015, 74.92 at 0.007 and 74.94 at 0.005; planar detection changes it by 0.0015 m/s."""
 
 SHIPPED = Path(__file__).parent / "tables"
-"""Folder of the package's own tables: `wrcore table build --out` under the name that `table_path` gives."""
+"""Folder of the tables in the package, written by `wrcore table build --out` with the file name of `table_path`."""
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
 FORM = 2
-"""Number of the form of tables. Count it up with every change to the numbers in a table or to its file: files in caches
-are then left alone, and built anew. A test compares entries of the default table with the solver."""
+"""Number of the form of tables. Increase it with every change of the numbers in a table or of its file format: cached
+files of another form are not used. A test compares entries of the default table with the solver."""
 
 SCHEMA = f"wrcore creep table {FORM}"
 
 
 @dataclass(frozen=True)
 class CreepTable:
-    """A creep table with what is known about it; called, it gives forces in physical units.
+    """Creep table with its properties and errors; a call returns forces in physical units.
 
     Attributes
     ----------
     data : CreepTableData
-        For kernels (`axes.table_lookup`).
+        Data for kernels (`axes.table_lookup`).
     planes : str
         "ellipse" or "sdec".
     tolerance : float
-        What the table was asked for: 99 % quantile of abs(dF)/(mu N).
+        Requested 99 % quantile of abs(dF)/(mu N).
     resolution : Resolution
     cases : int
-        Exact solutions in it.
+        Number of solved cases in the table.
     force_error, moment_error : tuple of float
-        Median, 95 %, 99 %, largest error found in the random check, over mu N and mu N c.
+        Median, 95 %, 99 % and maximum of the error in the random check, over mu N and mu N c.
 
     Examples
     --------
@@ -99,17 +99,17 @@ class CreepTable:
         shear_modulus: ArrayLike = 8.2e10,
         psi: ArrayLike = 0.0,
     ) -> tuple[Any, Any, Any]:
-        """Fx, Fy (N) and Mz (N m) by this table; arguments as for :func:`wrcore.creep_force`."""
+        """Return Fx, Fy (N) and Mz (N m) by this table; arguments as for :func:`wrcore.creep_force`."""
         return wrcore.creep_force(
             "table", a, b, normal_force, xi, eta, phi, mu, shear_modulus, self.nu, table=self, psi=psi
         )
 
     def kernel_data(self) -> CreepTableData:
-        """The `CreepTableData` to hand to kernels, your own with ``numba.njit``, too.
+        """Return the `CreepTableData` for kernels, including your functions compiled with ``numba.njit``.
 
-        `wrcore.creep.axes.table_lookup` takes it with ln(a/b), a/b, psi and the creepages xi', eta', phi', which are
-        xi, eta and phi c times G a b/(mu N), c^2 = a b; it returns Fx and Fy over mu N, Mz over mu N c, and 1 where a/b
-        or psi lay outside the table.
+        Arguments of `wrcore.creep.axes.table_lookup` are these data, ln(a/b), a/b, psi and the creepages xi', eta',
+        phi', which are xi, eta and phi c times G a b/(mu N), c^2 = a b. It returns Fx and Fy over mu N, Mz over mu N c,
+        and 1 if a/b or psi is outside the table.
 
         Examples
         --------
@@ -136,9 +136,10 @@ def _quantiles(errors):
 
 
 def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
-    """`CreepTable` at Poisson's ratio ``nu`` with four inputs (``planes`` "ellipse", psi = 0) or five ("sdec"), whose
-    99 % quantile of abs(dF)/(mu N) over random cases stays below ``tolerance``; the finest of the known resolutions is
-    the last resort. ``progress`` wraps the list of patches to solve, e.g. ``tqdm.tqdm``."""
+    """Build a `CreepTable` at Poisson's ratio ``nu`` with four inputs (``planes`` "ellipse", psi = 0) or five ("sdec").
+
+    Its 99 % quantile of abs(dF)/(mu N) over random cases is below ``tolerance``, if one of the known resolutions is
+    sufficient; else the finest is used. ``progress`` wraps the list of patches to solve, e.g. ``tqdm.tqdm``."""
     _check_arguments(nu, planes, tolerance)
     for resolution in _promising(planes, tolerance):
         data = build_data(nu, planes, resolution, progress)
@@ -149,7 +150,7 @@ def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress
 
 
 def _promising(planes, tolerance):
-    """Resolutions worth building: the first that is expected to meet the tolerance, and the finer ones."""
+    """Return the first resolution that is expected to meet the tolerance, and all finer ones."""
     known = RESOLUTIONS[planes]
     first = next((i for i, (expected, _) in enumerate(known) if expected <= tolerance), len(known) - 1)
     return [resolution for _, resolution in known[first:]]
@@ -182,19 +183,19 @@ def write_table(path, table):
 
 
 def load_table(path):
-    """Read a `CreepTable`; InputError if the file is missing, is none, or is no longer what was written."""
+    """Read a `CreepTable`; InputError if the file is missing, is not a creep table, or has been changed."""
     stamp = None
-    with suppress(OSError):  # said below
+    with suppress(OSError):  # `_read_table` reports the error
         status = os.stat(path)
         stamp = status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
     table = _read_table(path, stamp)
-    kalker = table.data.kalker._replace(cubic=table.data.kalker.cubic.copy())  # nobody can change another one's
+    kalker = table.data.kalker._replace(cubic=table.data.kalker.cubic.copy())  # callers do not share arrays
     return replace(table, data=table.data._replace(kalker=kalker, coefficients=table.data.coefficients.copy()))
 
 
 @lru_cache(maxsize=4)
 def _read_table(path, _):
-    """As `load_table`, once for a file of this size and time."""
+    """Read a `CreepTable`, cached for a file of the same size and time."""
     with checked_hdf5(path, "a creep table in HDF5") as file:
         found = file.attrs.get("schema")
         if found != SCHEMA:
@@ -220,7 +221,7 @@ def _read_datasets(path, file):
 
 
 def _check_axes(path, axes, planes, coefficients):
-    """Refuse a table that a look-up would read beyond: kernels trust its axes."""
+    """Raise InputError if axes and coefficients do not agree; kernels do not check indices."""
     ellipse = axes.n_psi == 1
     angles = (axes.n_alpha // 2 if ellipse else axes.n_alpha) + 3
     shape = (axes.n_g + 2, axes.n_psi + 2 * (not ellipse), axes.n_t + 2, angles, axes.n_beta + 2, 4)
@@ -235,19 +236,19 @@ def _check_axes(path, axes, planes, coefficients):
 
 
 def show_progress(patches):
-    """Progress bar with the time left, where someone watches; the ``progress`` of the functions here."""
+    """Show a progress bar with the remaining time in a terminal; for the argument ``progress`` in this module."""
     from tqdm import tqdm
 
     return tqdm(patches, desc="creep table", unit="patch", disable=None, leave=False)
 
 
 def table_path(nu, planes, tolerance):
-    """Where the cache keeps the table with these properties."""
+    """Path of the table with these properties in the cache."""
     return table_folder() / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_form{FORM}.h5"
 
 
 def kept_tables(nu, planes, tolerance):
-    """Files that hold the table with these properties: the package's own, that of the cache; none of both may exist."""
+    """Return the existing files of the table with these properties, in the package and in the cache."""
     path = table_path(nu, planes, tolerance)
     return [place for place in (SHIPPED / path.name, path) if place.exists()]
 
@@ -259,9 +260,9 @@ def ensure_table(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable | None = None,
 ) -> CreepTable:
-    """The table from the package or the cache; built and cached first where there is none, or a damaged or other one.
+    """Return the table from the package or the cache; build and cache it if it is missing or damaged.
 
-    Two processes that need the same table at once both build it and the later rename wins, with equal content.
+    Two processes that need the same table at once both build it; the file of the later one remains, with equal content.
 
     Parameters
     ----------
@@ -297,7 +298,7 @@ def ensure_table(
 
 
 def table_info(table):
-    """Properties of a `CreepTable`, or of one in a file, as a flat dict."""
+    """Return the properties of a `CreepTable`, or of one in a file, as a flat dict."""
     table = table if isinstance(table, CreepTable) else load_table(table)
     info = {"planes": table.planes, "nu": table.nu, "tolerance": table.tolerance, "cases": table.cases}
     info |= {f"nodes_{name[2:]}": value for name, value in table.data.axes._asdict().items() if name.startswith("n_")}
