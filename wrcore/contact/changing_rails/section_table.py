@@ -1,16 +1,16 @@
-"""A rail that changes along the track, over arc length as a wheel sees it: what runs look its section up in.
+"""Table of the equivalent sections of a rail that changes along the track, over arc length, for runs.
 
-The sections of `wrcore.contact.changing_rails.sections`, for a wheelset in the middle and without roll and yaw, at arc
-lengths `S_STEP` apart, or further where slices are; between these runs a cubic Hermite polynomial along the track.
-Before the first and behind the last slice the rail goes over, along `BLEND`, into one that is the same everywhere, and
-stays that.
+The sections of `wrcore.contact.changing_rails.sections`, for a centred wheelset without roll and yaw, are computed at a
+spacing of `S_STEP`, or more for widely spaced slices. Between them, a cubic Hermite polynomial interpolates along the
+track. Before the first and after the last slice, the rail is blended over the length `BLEND` into a plain rail.
 
-A wheel out of round is seen over its angle in the same way, a corrugated rail over a wave: both go on for ever. Their
-sections are the plain rail's and what the wheel reaches further, or the rail is higher, at strips of some radii, with
-splines between these; of a wheel that is round in part the table goes over into the plain rail there, as it is.
+The table of a wheel out of round is over the angle of the wheel, that of a corrugated rail over a wave; both are
+periodic. Their sections are the plain rail's plus the irregularity of wheel or rail, at strips of some radii, with
+splines between these. For a wheel that is partly round, the table ends in the plain rail there.
 
-A wheelset that is moved sideways sees the section through strips of a radius dR larger or smaller: it lies
-x^2 dR/(2 R^2) higher for a wheel that touches x ahead of its axle. One that yaws sees it as far ahead as its wheel is.
+A wheelset with a lateral displacement touches the section with strips of a radius larger by dR: the section is
+x^2 dR/(2 R^2) higher for a wheel that touches x ahead of its axle. Under yaw the section is that at the wheel's arc
+length.
 """
 
 from dataclasses import dataclass, replace
@@ -37,29 +37,28 @@ from wrcore.geometry.changing_rails.slices import RailSlices
 from wrcore.geometry.profiles.profile import ProfileCurve, averaged_second_derivative
 
 S_STEP, U_STEP = 2e-3, 3e-4
-"""Distances of the nodes along and across, m."""
+"""Node spacings along and across the track, m."""
 
 LARGEST_STEP, PER_SLICE = 1e-2, 10
-"""Greatest distance of the nodes along (m), and their number between two slices, of a rail whose heads go through."""
+"""Maximum node spacing along the track (m), and number of nodes between two slices, of a rail with continuous heads."""
 
 PER_CELL = round(SCAN_STEP / U_STEP)
-"""Nodes across per cell of the scan."""
+"""Number of nodes across per cell of the scan."""
 
 BLEND, PLAY = 0.1, 0.012
-"""Length over which a rail goes over into one that is the same everywhere, and how far a wheel may be off its place
-beyond the ends of its profile, m."""
+"""Length over which a rail is blended into a plain rail, and maximum lateral displacement of a wheel beyond the ends of
+its profile, m."""
 
 COLUMNS = 9
-"""Radii of the strips for which a wheel out of round is seen."""
+"""Number of radii of strips for which the sections of a wheel out of round are computed."""
 
 SECTION_ROWS = [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]
 
 PAD = 16
-"""Nodes of a wheel out of round before its turn, or before and behind what is not round of it: a wheel that yaws sees
-strips of other places."""
+"""Number of extra nodes at the ends of a table of a wheel out of round: under yaw, strips have different angles."""
 
 STRETCH = 64
-"""Steps along the track for which bounds of gaps are taken together."""
+"""Number of steps along the track with common bounds of gaps."""
 
 HEIGHT, SLOPE, SECOND, AHEAD, BEND = range(5)
 """Rows of a section: height (m), its slope over u, second derivative for Hertz (1/m), and the first two columns of
@@ -69,28 +68,29 @@ ROWS = 5
 
 @dataclass(frozen=True)
 class SectionTable:
-    """Sections over arc length, or over the angle of a wheel."""
+    """Equivalent sections over arc length, or over the angle of a wheel."""
 
     begin: float
     """Arc length (m) or angle (rad) of the first node."""
     step: float
-    """From one to the next, m or rad."""
+    """Node spacing, m or rad."""
     sections: np.ndarray
-    """(n, 2, ROWS, m): rows, and their rates times the step; the first and the last one are the plain rail."""
+    """(n, 2, ROWS, m): rows, and their derivatives times the step; the first and last section are the plain rail."""
     strips: np.ndarray
-    """(2, m): of the wheel's strips over them 1/R (1/m), and how far a yaw moves their points that touch, over what it
-    moves that of the tape circle's plane, m/rad."""
+    """(2, m): 1/R (1/m) of the wheel's strips over the nodes, and the displacement of their contact points per yaw,
+    relative to that of the tape circle's plane, m/rad."""
     geometry: ContactGeometry
-    """On the plain rail."""
+    """Geometry of the wheel on the plain rail."""
     bounds: np.ndarray
-    """(1 + stretches, ...): `ContactGeometry.zone_gaps` of the plain rail, then over each stretch."""
+    """(1 + stretches, ...): `ContactGeometry.zone_gaps` of the plain rail, then of each stretch of `STRETCH` steps."""
 
 
 def section_table(pair, plain, backwards=False, lateral=None):
-    """`SectionTable` of a `WheelOnSlices` that goes over into a ``plain`` rail at both ends; ``backwards``: of one that
-    is
-    laid the other way round, whose arc lengths then count from the same origin against those of its slices. All rails
-    that the wheel passes lie between two ``lateral`` coordinates, m; left out: this one alone."""
+    """Return the `SectionTable` of a `WheelOnSlices` that is blended into a ``plain`` rail at both ends.
+
+    ``backwards``: the rail is reversed; arc lengths are from the same origin, opposite to those of its slices.
+    ``lateral``: the two lateral coordinates (m) between which all rails lie that the wheel passes; by default those of
+    this rail."""
     wide = _widened(pair)
     first, last = (pair.rail.s[k] + sign * (REACH + BLEND) for k, sign in ((0, -1.0), (-1, 1.0)))
     begins, step = pair.rail.begins(), _step_along(pair.rail)
@@ -120,7 +120,7 @@ def section_table(pair, plain, backwards=False, lateral=None):
 
 
 def _step_along(rail):
-    """Distance of the nodes along a rail of slices, m, a multiple of `STEP`."""
+    """Node spacing along a rail of slices, m, a multiple of `STEP`."""
     if rail.begins().size or rail.s.size < 2:
         return S_STEP
     even = STEP * np.floor(np.diff(rail.s).min() / PER_SLICE / STEP + 1e-9)
@@ -128,9 +128,8 @@ def _step_along(rail):
 
 
 def shape_table(pair, shape):
-    """`SectionTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound` or a `SlicedWheel`, or the rail of
-    a
-    `Corrugation`."""
+    """Return the `SectionTable` of a `WheelOnRail` with the ``shape`` of an `OutOfRound` or a `SlicedWheel` (wheel), or
+    a `Corrugation` (rail)."""
     plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
     wide = _widened(WheelOnSlices(pair.wheel, RailSlices.of(plain), *sizes))
     u = _lateral(wide, plain, wide.rail.lateral)
@@ -161,7 +160,7 @@ def shape_table(pair, shape):
 
 
 def _section_of_radii(wide, shape, places, u, radii, own):
-    """Height, ahead and bend (n, 3, m) of a shape that is the same for all strips of a radius."""
+    """Return height, AHEAD and BEND (n, 3, m) for a shape that is equal for all strips of the same radius."""
     from scipy.interpolate import make_interp_spline
 
     known, some = np.unique(np.round(radii[own], 6), return_index=True)
@@ -172,8 +171,9 @@ def _section_of_radii(wide, shape, places, u, radii, own):
 
 
 def _section_of_slices(wide, shape, places, u, at, own):
-    """The same of a wheel of slices, strip by strip; beyond them as at their ends. ``at``: strips over ``u``, of which
-    the wheel has its ``own``."""
+    """Return height, AHEAD and BEND (n, 3, m) for a wheel of slices, for each strip; constant beyond its ends.
+
+    ``at``: wheel coordinates over ``u``; ``own``: indices of those on the wheel's profile."""
     first, last = shape.within(at[own])
     some = own[first : last + 1]
     if some.size < 4:
@@ -184,15 +184,16 @@ def _section_of_slices(wide, shape, places, u, at, own):
 
 
 def _plain_geometry(pair, plain, u, section):
-    """`ContactGeometry` on a rail with the rows of the plain one, of the type of those that change."""
+    """Return the `ContactGeometry` on the plain rail, of the type for rails that change along the track."""
     curve = ProfileCurve(plain.name, "rail", u, *section[: SECOND + 1].copy())
     geometry = contact_geometry(pair.wheel, curve, pair.rolling_radius, pair.half_distance, pair.rail_distance)
     return geometry._replace(along=np.zeros((u.size, 5)))
 
 
 def _widened(pair):
-    """The pair with a wheel that goes on beyond its ends: columns beside it, where it comes when it moves sideways, are
-    seen by strips of the radius at its end."""
+    """Return the pair with a wheel profile extended at both ends with a constant radius.
+
+    With a lateral displacement the wheel is then over all columns of the table."""
     wheel, count = pair.wheel, round(PLAY / pair.wheel.spacing)
     more = pair.wheel.spacing * np.arange(1, count + 1)
     u = np.concatenate([wheel.u[0] - more[::-1], wheel.u, wheel.u[-1] + more])
@@ -202,7 +203,8 @@ def _widened(pair):
 
 
 def _lateral(pair, plain, there):
-    """Lateral coordinates over which ``there`` is a rail and may be a wheel, m: whole cells, and a node more."""
+    """Return lateral coordinates (m) in the range ``there`` of rails that a wheel can reach: whole cells, and one more
+    node."""
     shift = pair.half_distance - pair.rail_distance
     low = max(min(there[0], plain.u[0]), pair.wheel.u[0] + shift)
     high = min(max(there[1], plain.u[-1]), pair.wheel.u[-1] + shift)
@@ -211,7 +213,7 @@ def _lateral(pair, plain, there):
 
 
 def _plain_section(plain, u, floor):
-    """Rows of the plain rail."""
+    """Return the rows (ROWS, m) of the plain rail."""
     section = np.zeros((ROWS, u.size))
     on = (u >= plain.u[0]) & (u <= plain.u[-1])
     section[HEIGHT] = floor
@@ -221,7 +223,7 @@ def _plain_section(plain, u, floor):
 
 
 def _add_rates(sections, exists):
-    """Rates by differences between neighbours that exist: to none across the beginning or the end of a head."""
+    """Fill the derivatives by differences between sections, but not across the beginning or the end of a head."""
     values, rates = sections[:, 0], sections[:, 1]
     ahead = np.where((exists[1:] & exists[:-1])[:, None], np.diff(values, axis=0), np.nan)
     none = np.full((1, *ahead.shape[1:]), np.nan)
@@ -231,8 +233,9 @@ def _add_rates(sections, exists):
 
 
 def _with_bounds(table, faded=False):
-    """The table with bounds that hold for all sections of a stretch, ``faded`` into the plain rail or not, and for all
-    poses that are not planar."""
+    """Return the table with bounds of gaps for all sections of each stretch, for spatial detection.
+
+    ``faded``: the bounds also hold for sections blended with the plain rail."""
     geometry, cells = table.geometry, (table.sections.shape[3] - 1) // PER_CELL
     values, rates = table.sections[:, 0], np.abs(table.sections[:, 1])
     bend = np.abs(np.diff(values[:, SLOPE], axis=1)) / U_STEP
@@ -254,7 +257,8 @@ def _with_bounds(table, faded=False):
 
 
 def _of_cells(values, cells, beside):
-    """Largest value of (n, m) over each cell of the scan, its ends and as many cells ``beside`` it, (n, cells)."""
+    """Maximum of values (n, m) over each cell of the scan with its ends and ``beside`` cells on either side, (n,
+    cells)."""
     wide = np.pad(values, ((0, 0), (PER_CELL * beside, PER_CELL * beside + 1)), mode="edge")
     starts, reach = PER_CELL * np.arange(cells), PER_CELL * (1 + 2 * beside) + 1
     return np.max([wide[:, starts + k] for k in range(reach)], axis=0)
