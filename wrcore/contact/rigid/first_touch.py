@@ -1,13 +1,12 @@
-"""Rigid first touch: where a wheelset without yaw that is lowered onto the rails touches them.
+"""First contact points of a rigid wheelset without yaw that is lowered onto the rails.
 
-Each wheel touches where the height that the rail asks of the wheelset's centre,
+Each wheel touches where the height of the wheelset's centre at contact,
 
     h(u) = f_rail(u_r) - (c sin(roll) - r cos(roll)),   u_r = y + c cos(roll) + r sin(roll) - d_rail,
 
-is greatest over the wheel's lateral coordinate u (c = half distance + u along the axle, r = r0 - f(u)). All of it is
-written for the left side; the right side is its mirror image (y and roll change sign). Roll is either solved, so that
-both wheels touch, or left at zero, so that each side is searched by itself: the reference values of EN 15302 are of
-the second kind.
+has its maximum over the wheel's lateral coordinate u (c = half distance + u along the axle, r = r0 - f(u)). Formulas
+are for the left side; the right side is its mirror image (y and roll change sign). Roll is either solved, so that both
+wheels touch, or zero, so that each side is searched separately, as in the reference values of EN 15302.
 """
 
 from __future__ import annotations
@@ -26,23 +25,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NODE_STEP = 1e-4
-"""Distance of the wheel's nodes in the search for the first touch, m."""
+"""Spacing of the wheel's nodes in the search for the first touch, m."""
 
 _RESERVE = 1e-6
-"""Local maxima this close to the highest node compete, m: above NODE_STEP^2 / 8 times any curvature up to 800 1/m."""
+"""Distance below the highest node within which local maxima are refined, m; NODE_STEP^2 / 8 times 800 1/m."""
 
 _ROLL_STEPS = 40
 
 _LEVEL = 1e-9
-"""Heights of both sides that differ by more are not one pose, m: the search leaves 1e-12, a contact jump 1e-7 and more.
-"""
+"""Maximum difference of the heights of both sides, m. The search ends at 1e-12; a contact jump is 1e-7 or more."""
 
 _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
 
 
 @jit(fastmath=FAST, inline="always")
 def _hermite(nodes, start, step, u):
-    """Value and slope of the cubic Hermite polynomial; end cells are continued outwards."""
+    """Value and slope of the cubic Hermite interpolant at ``u``; end cells are extrapolated."""
     position = (u - start) / step
     i = min(max(int(position), 0), nodes.shape[0] - 2)
     t = position - i
@@ -53,7 +51,7 @@ def _hermite(nodes, start, step, u):
 
 @jit
 def _height(side, u, y, cosine, sine):
-    """Height (m) asked of the wheelset's centre by wheel coordinate ``u``, its slope over u, u_r, f' and r."""
+    """Height (m) of the wheelset's centre for contact at wheel coordinate ``u``, its slope over u, u_r, f' and r."""
     extra, slope = _hermite(side.wheel, side.wheel_start, side.wheel_step, u)
     radius, reach = side.rolling_radius + extra, side.half_distance + u
     u_rail = y + reach * cosine + radius * sine - side.rail_distance
@@ -64,8 +62,8 @@ def _height(side, u, y, cosine, sine):
 
 @jit
 def _summit(side, low, high, y, cosine, sine):
-    """Wheel coordinate of the greatest height between ``low`` and ``high``; an end if it does not turn inside."""
-    while high - low > 1e-9:  # narrow down until one turn is left: noisy profiles turn several times
+    """Wheel coordinate of the maximum height between ``low`` and ``high``; an end if there is no maximum inside."""
+    while high - low > 1e-9:  # narrow the interval to one maximum: noisy profiles have several
         if _height(side, low, y, cosine, sine)[1] >= 0.0 >= _height(side, high, y, cosine, sine)[1]:
             break
         part, best, best_at = (high - low) / 8.0, -np.inf, 0
@@ -85,7 +83,7 @@ def _summit(side, low, high, y, cosine, sine):
 
 @jit
 def _touch(side, y, roll, heights, found):
-    """First touch of one side (mirrored to the left); fills ``found``, NaN if it is at an end of a profile."""
+    """Fill ``found`` with the first touch of one side (mirrored to the left); NaN if it is at an end of a profile."""
     cosine, sine = math.cos(roll), math.sin(roll)
     rail_end = side.rail_start + side.rail_step * (side.rail.shape[0] - 1)
     n, best = heights.shape[0], -np.inf
@@ -110,7 +108,7 @@ def _touch(side, y, roll, heights, found):
 
 @jit
 def _turn_rate(side, found, roll):
-    """Rate of a side's height over its own roll at the touching point, m/rad (envelope theorem)."""
+    """Derivative of a side's height with respect to the roll of this side at contact, m/rad (envelope theorem)."""
     cosine, sine = math.cos(roll), math.sin(roll)
     reach = side.half_distance + found[_U_WHEEL]
     sideways = found[_RADIUS] * cosine - reach * sine
@@ -119,7 +117,7 @@ def _turn_rate(side, found, roll):
 
 @jit
 def _touch_both(left, right, y, solve_roll, buffers, found):
-    """Roll (rad) of the wheelset at lateral position ``y`` and the touching points of both sides."""
+    """Return the roll (rad) of the wheelset at lateral position ``y``; fill the contact points of both sides."""
     roll = 0.0
     for _ in range(_ROLL_STEPS):
         _touch(left, y, roll, buffers[0], found[0])
@@ -133,7 +131,7 @@ def _touch_both(left, right, y, solve_roll, buffers, found):
 
 @jit
 def _tabulate(left, right, shifts, solve_roll, rolls, found):
-    """Touching points for all lateral positions: ``found`` has shape (n, 2, 5)."""
+    """Fill rolls and contact points for all lateral positions; ``found`` has shape (n, 2, 5)."""
     nodes_left = int((left.wheel.shape[0] - 1) * left.wheel_step / NODE_STEP + 1e-9) + 1
     nodes_right = int((right.wheel.shape[0] - 1) * right.wheel_step / NODE_STEP + 1e-9) + 1
     buffers = (np.empty(nodes_left), np.empty(nodes_right))
@@ -145,7 +143,7 @@ def _tabulate(left, right, shifts, solve_roll, rolls, found):
 def first_touch(
     pair: WheelsetOnTrack, shifts: Annotated[ArrayLike, Within(-0.1, 0.1, "m", dimensions=1)], roll: bool = True
 ) -> pd.DataFrame:
-    """Where a rigid wheelset without yaw touches the rails, and the rolling radius difference.
+    """Compute first contact points of a rigid wheelset without yaw, and the rolling radius difference.
 
     Parameters
     ----------

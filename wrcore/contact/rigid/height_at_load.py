@@ -11,20 +11,19 @@ from wrcore.contact.search.detection import find_patches
 from wrcore.kernels.jit import jit
 
 Z_RANGE = 0.03
-"""Half of the range of heights that is searched around the nominal one, m."""
+"""Half range of the search for heights around the nominal height, m."""
 
 ROLL_RANGE = 0.05
-"""Half of the range of roll angles that is searched, rad."""
+"""Half range of the search for roll angles, rad."""
 
 
 @jit(allocates=False)
 def static_wheel_force(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
-    """Number of patches of one wheel (``side`` +1 left, -1 right) in a pose of the wheelset (m, rad) and the vertical
-    force on it (N), at rest; fills ``patches`` (MAX_PATCHES, PATCH_COLUMNS), semi-axes and normal forces with them.
+    """Return the number of patches and the vertical force (N) of one wheel at rest (``side`` +1 left, -1 right).
 
-    ``modulus`` (Pa) is the stiffness factor in front of Hertz's law: E*, or E* (1 + c_e)/2 with the damping factor at
-    rest.
-    """
+    Fills ``patches`` (MAX_PATCHES, PATCH_COLUMNS), with semi-axes and normal forces. Position and attitude of the
+    wheelset are in m and rad. ``modulus`` (Pa) is the stiffness factor of Hertz's law: E*, or E* (1 + c_e)/2 with the
+    damping factor at rest."""
     ex, ey, ez = -math.sin(yaw) * math.cos(roll), math.cos(yaw) * math.cos(roll), math.sin(roll)
     count = find_patches(geometry, side, y, z, side * ex, side * ey, side * ez, spatial, reduction, patches)
     force = 0.0
@@ -39,33 +38,34 @@ def static_wheel_force(geometry, hertz, modulus, side, y, z, roll, yaw, spatial,
 
 
 FIRST_STEP = 1e-5
-"""First step of the search for two heights around the one sought, m; each next one is four times as long."""
+"""First step of the search for an interval of heights, m; each further step is four times as long."""
 
 CLOSE = 1e-12
-"""Relative error of F^(2/3) that ends the search for a height: what the rounding of a height leaves."""
+"""Relative error of F^(2/3) at which the search for a height ends: that of rounding of the height."""
 
 ROLL_SLOPE = -1.5
-"""First guess of the change with roll of the left wheel's own height less the right wheel's, m: the rails' distance."""
+"""First guess of d(z_left - z_right)/d(roll) of the heights at load of both wheels, m: minus the rails' distance."""
 
 MOST_SECANTS = 20
-"""Heights tried before the search for one halves its interval instead."""
+"""Number of secant steps in the search for a height, after which its interval is halved instead."""
 
 LARGEST_TURN = 0.02
-"""A step in roll beyond this is not trusted, rad."""
+"""Maximum step in roll of the secant method, rad."""
 
 LEVEL = 1e-12
-"""Both wheels carry their loads where the heights at which each does so differ by no more than this, m. A penetration
-of 50 um then has an error of 2e-8; the searches end at 1e-13."""
+"""Maximum difference of the heights at load of both wheels, m. A penetration of 50 µm then has an error of 2e-8; the
+searches end at 1e-13."""
 
 BRANCH_REACH, BRANCH_STEP = 6e-5, 2e-6
-"""Where overlaps merge into one patch, its force falls by several per cent: a wheel carries its load at two heights.
-The second one is sought within this distance, in these steps, m. S1002 on 60E1 has them 12 um apart."""
+"""Range and step of the search for a second height at load, m. Where overlaps merge into one patch, its force falls by
+several per cent, so that a wheel carries its load at two heights. On S1002 and 60E1 they differ by 12 µm."""
 
 
 @jit(allocates=False)
 def _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, low, high, patches):
-    """Height (m) at which one wheel carries ``load`` (N), by bisection to rounding: it carries more at ``low`` and less
-    at ``high``."""
+    """Height (m) at which one wheel carries ``load`` (N), by bisection to rounding between ``low`` and ``high``.
+
+    The force is larger than the load at ``low`` and smaller at ``high``."""
     while high - low > 1e-14:
         middle = 0.5 * (low + high)
         if middle == low or middle == high:
@@ -82,8 +82,9 @@ def _bisected_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, redu
 
 @jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
-    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
-    within ``Z_RANGE`` of ``nominal`` does."""
+    """Wheelset height z (m) at which one wheel carries the vertical ``load`` (N), by bisection to rounding.
+
+    NaN if there is no such height within ``Z_RANGE`` of ``nominal``."""
     low, high = nominal - Z_RANGE, nominal + Z_RANGE
     if static_wheel_force(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
         return np.nan
@@ -94,7 +95,9 @@ def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
 
 @jit(allocates=False)
 def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, guess, patches):
-    """As `height_at_load`, from a guess: regula falsi (Illinois) on F^(2/3), almost linear in z. NaN if it is lost."""
+    """Height (m) at which one wheel carries ``load`` (N), from a guess; NaN without convergence.
+
+    The method is regula falsi (Illinois) on F^(2/3), which is almost linear in z."""
     goal = load ** (2.0 / 3.0)
     z, step, last = guess, FIRST_STEP, 0
     low = high = np.nan
@@ -152,7 +155,7 @@ def _branch_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
 
 @jit(allocates=False)
 def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
-    """Roll and height as from `settle`, by secants: far faster. NaN where they do not arrive."""
+    """Roll (rad) and height (m) of `settle` by the faster secant method; NaN without convergence."""
     roll = before = difference = 0.0
     slope, z, other = ROLL_SLOPE, nominal, nominal
     for k in range(25):
@@ -175,11 +178,12 @@ def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, 
 
 @jit(nogil=True)
 def settle(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """Roll (rad) and height (m) at which each wheel, of `ContactGeometry` ``left`` and ``right``, carries ``load`` (N)
-    vertically; NaN where a wheel does not reach it. Where secants do not arrive, bisection takes over: the height of
-    the left wheel falls and that of the right wheel rises with roll, but for the jumps of `BRANCH_REACH`. It is done
-    for each choice of branches until both heights are one. Where no choice does that, the nearest roll is returned, at
-    which the wheels carry other loads: callers compare."""
+    """Return roll (rad) and height (m) at which each wheel carries the vertical ``load`` (N); NaN if impossible.
+
+    ``left`` and ``right`` are `ContactGeometry`. If secants do not converge, bisection is used: with roll, the height
+    of the left wheel falls and that of the right wheel rises, except at jumps (`BRANCH_REACH`). Bisection is repeated
+    for each choice of branches until both heights are equal. If no choice succeeds, the roll with the minimum
+    difference is returned; callers must compare the loads."""
     patches = np.empty((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     roll, z = _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
     if not np.isnan(z):

@@ -14,9 +14,11 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 
 
 def read_poses(path):
-    """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m, s_m,
-    pitch_rad, V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. No two rows have one
-    pose_id. InputError names the file, the column, the row and what was expected."""
+    """Read a CSV file of positions and attitudes of a wheelset as a table (pandas.DataFrame).
+
+    Columns: pose_id, y_m, yaw_rad and optionally roll_rad, z_m, s_m, pitch_rad, V_m_per_s, omega_rad_per_s, vy_m_per_s,
+    yaw_rate_rad_per_s, mu; NaN if not given. Each pose_id is unique. InputError names file, column, row and the
+    expected value."""
     import pandas as pd
 
     limits = POSE_LIMITS | MOTION_LIMITS
@@ -52,7 +54,7 @@ def read_poses(path):
 
 
 def _refuse(path, frame, name, bad, expected):
-    """Name the first row that is bad."""
+    """Raise InputError for the first invalid row."""
     import pandas as pd
 
     if bad.any():
