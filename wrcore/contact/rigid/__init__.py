@@ -1,1 +1,1 @@
-"""Contact without elasticity: first touch, conicity, heights at a load."""
+"""Rigid contact geometry: first touch, conicity, and heights at a given load."""

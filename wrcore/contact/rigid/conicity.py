@@ -36,14 +36,14 @@ y = 2.4958 and 6.6989 mm, and the dr(y) behind the reference values at once beyo
 puts 2.5, 2.6 and 2.7 mm outside the band (0.078 for 0.025). A gauge wider by 0.01 mm puts all amplitudes inside."""
 
 REACH = 0.010
-"""dr(y) is tabulated this far beyond the largest amplitude, m: unlike sides swing about a shifted centre."""
+"""Range of the table of dr(y) beyond the maximum amplitude, m: with different sides the centre of motion is shifted."""
 
 _NOISE = 1e-9
-"""Rolling radius differences below this are zero, m: play between symmetric profiles leaves rounding errors."""
+"""Rolling radius difference below which it is set to 0, m: symmetric profiles with play have rounding errors."""
 
 
 class _Well:
-    """Potential Phi of a rolling radius difference that is linear between its nodes: quadratic in each cell."""
+    """Potential Phi of a rolling radius difference that is linear between its nodes; it is quadratic in each cell."""
 
     def __init__(self, y, difference):
         self.y, self.difference = y, np.where(np.abs(difference) < _NOISE, 0.0, difference)
@@ -57,7 +57,7 @@ class _Well:
         return float(self.potential[i] + 0.5 * (y - self.y[i]) * (self.difference[i] + here))
 
     def centre(self):
-        """Place (m) where the difference rises through zero, nearest to y = 0, mid-way through play; NaN if none."""
+        """Position (m) nearest to y = 0 where the difference rises through zero, in the middle of play; NaN if none."""
         d = self.difference
         cells = np.flatnonzero((d[:-1] <= 0.0) & (d[1:] >= 0.0))
         if not cells.size:
@@ -69,7 +69,7 @@ class _Well:
         return float(min((0.5 * (group[0] + group[-1]) for group in groups), key=abs))
 
     def turning_points(self, amplitude, centre):
-        """Ends (m) of the motion about ``centre`` whose peak to peak is twice ``amplitude``; NaN outside the table."""
+        """Ends (m) of the motion about ``centre`` of peak-to-peak value 2 ``amplitude``; NaN outside the table."""
 
         def excess(start):
             return self(start + 2.0 * amplitude) - self(start)
@@ -117,10 +117,12 @@ def _cell_time(bend, h, speed):
 
 
 def equivalent_conicity(y, difference, amplitudes):
-    """Equivalent conicities (m,) by Klingel's integral (EN 15302 annex B, UIC 519) for ``amplitudes`` (m,), m, and
-    turning points (m, 2), m, from the difference r_left - r_right (m), linear between increasing positions ``y`` (m).
-    The motion swings about the zero nearest to y = 0, between points of equal potential. 0: it crosses play without a
-    difference. NaN: the table does not reach, or a wrong-signed difference lets no such wave exist."""
+    """Return equivalent conicities (m,) by Klingel's integral (EN 15302 annex B, UIC 519), and turning points (m, 2).
+
+    ``amplitudes`` (m,) are in m. ``difference`` is r_left - r_right (m), linear between increasing positions ``y`` (m).
+    Turning points (m) have equal potential, around the zero nearest to y = 0. The conicity is 0 if the
+    difference is 0 over the whole motion (play). It is NaN if the table is too short, or if there is no such wave
+    because the difference has the wrong sign."""
     y, difference = np.asarray(y, dtype=float), np.asarray(difference, dtype=float)
     amplitudes = np.atleast_1d(np.asarray(amplitudes, dtype=float))
     if y.ndim != 1 or y.shape != difference.shape or y.size < 2 or not np.all(np.diff(y) > 0.0):
@@ -194,7 +196,7 @@ def conicity_curve(
 
 
 def _around_centre(y, difference):
-    """The stretch around y = 0 on which both wheels touch inside their profiles."""
+    """Return positions and differences of the range around y = 0 in which both wheels touch inside their profiles."""
     bad = np.flatnonzero(~np.isfinite(difference))
     home = int(np.argmin(np.abs(y)))
     first, last = bad[bad <= home].max(initial=-1) + 1, bad[bad >= home].min(initial=y.size)

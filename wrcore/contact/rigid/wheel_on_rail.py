@@ -1,4 +1,4 @@
-"""A wheel on its rail, and a wheelset on its track: profiles, radii and where they lie."""
+"""A wheel on its rail, and a wheelset on its track: profiles, radii and positions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wrcore.geometry.profiles.profile import GAUGE_DEPTH, ProfileCurve
 from wrcore.geometry.track import GAUGES, SIDES
 
 RADII, HALF_DISTANCES = (0.05, 2.0), (0.2, 1.5)
-"""Rolling radii, and distances of the tape circles from the wheelset's centre, that are taken for metres, m."""
+"""Permitted ranges of rolling radii and of distances of the tape circles from the wheelset's centre, m."""
 
 
 @checked
@@ -54,7 +54,7 @@ class WheelOnRail:
 
     @cached_property
     def geometry(self):
-        """The `ContactGeometry` of it, for kernels; InputError where a part of a rail's profile has no gauge."""
+        """Return the `ContactGeometry` for kernels; InputError if a part of a rail's profile has no gauge."""
         distance = self.rail_distance
         if distance is None or math.isnan(distance):
             raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
@@ -66,7 +66,7 @@ class WheelOnRail:
 
 @lru_cache(maxsize=16)
 def _geometry_of(wheel, rail, *lengths):
-    """The `ContactGeometry`, of some 2 MB, that is copied for scenes with the same profiles."""
+    """Return the cached `ContactGeometry`, of about 2 MB, that scenes with the same profiles copy."""
     return contact_geometry(wheel.curve, rail.curve, *lengths)
 
 
@@ -137,7 +137,7 @@ class WheelsetOnTrack:
         rolling_radius: float = 0.46,
         half_distance: float = 0.75,
     ) -> WheelsetOnTrack:
-        """The usual case: the right side is the mirror image of the left one."""
+        """Return a wheelset on track whose right side is the mirror image of the left side: the usual case."""
         side = WheelOnRail(wheel, rail, rolling_radius)
         return cls(side, side, half_distance, gauge)
 
@@ -152,5 +152,5 @@ class WheelsetOnTrack:
         return 0.5 * (self.left.rolling_radius + self.right.rolling_radius)
 
     def rail_distance(self, side: WheelOnRail) -> float:
-        """Origin of a side's rail from the centre line, m, positive."""
+        """Distance of the origin of a side's rail from the track's centre line, m, positive."""
         return 0.5 * self.gauge + side.rail.gauge_offset(self.gauge_depth)
