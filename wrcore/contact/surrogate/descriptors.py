@@ -1,7 +1,7 @@
 """Dimensionless numbers that describe the overlap of one contact patch: the inputs of the surrogate.
 
-Contact of two half-spaces lies inside the undeformed overlap, so the gap over the overlap tells all that the normal
-problem depends on. Half-space contact has no length scale of its own. With the penetration g normal to a strip, its
+Contact of two half-spaces lies inside the undeformed overlap, so that the normal problem depends only on the gap over
+the overlap. Half-space contact has no intrinsic length scale. With the penetration g normal to a strip, its
 width ds and radius R, the weights and scales of a patch are
 
     q = g^2 ds,   M0 = sum q,   <f> = sum q f / M0,   A = <cos(angle) / (2 R)>,   l = (M0 / A^2)^(1/5)

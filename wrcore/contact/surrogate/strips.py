@@ -1,6 +1,6 @@
-"""Strips of the wheel across one contact patch, and what the surrogate needs to know of each.
+"""Strips of the wheel across one contact patch: the input data of the surrogate.
 
-The strips stand at nodes of the wheel profile: at every fourth one on a tread
+The strips are at nodes of the wheel profile: at every fourth one on a tread
 (:func:`wrcore.contact.search.moved.smooth_nodes`). Where these are more than `ENOUGH`, only every second or every
 fourth of them has a strip; 32 or more are then left.
 """
@@ -31,13 +31,13 @@ from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
 
 MOST_STRIPS = 1024
-"""Most strips of one patch."""
+"""Maximum number of strips of one patch."""
 
 ENOUGH = 64
-"""Number of nodes beyond which every second one is left out; beyond twice this number three of four are."""
+"""Number of nodes above which only every second node has a strip; above twice this number, every fourth."""
 
 _END_STRIPS = 16
-"""Places kept for the ends of overlaps."""
+"""Number of array elements reserved for the ends of overlaps."""
 
 _NO_RAIL = 1.0
 """Gap of a strip beyond the end of the rail's profile, m."""
@@ -79,13 +79,13 @@ class Strips(NamedTuple):
 
 
 def new_strips():
-    """Scratch arrays of `Strips`."""
+    """Return empty arrays for `Strips`."""
     return Strips(*(np.zeros(MOST_STRIPS + LANES) for _ in Strips._fields))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _load(rows, row, start, stride):
-    """Eight numbers of a row: every ``stride``-th one from ``start`` on."""
+    """Return eight numbers of a row, every ``stride``-th from ``start`` on."""
     if stride == 1:
         return lanes.load8(rows, np.uint64(row), start)
     return lanes.every8(rows, np.uint64(row), start, np.uint64(stride))
@@ -93,7 +93,7 @@ def _load(rows, row, start, stride):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _angles(tangent, secant):
-    """Angles with these tangents and secants."""
+    """Angles (rad) from their tangents and secants."""
     half, (c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10) = tangent / (1.0 + secant), _ANGLE_SERIES
     q = half * half
     low = c0 + q * (c1 + q * (c2 + q * (c3 + q * c4)))
