@@ -1,4 +1,4 @@
-"""Poses of a wheelset from a file: for ``wrcore contact``."""
+"""Positions and attitudes of a wheelset from a file, for ``wrcore contact``."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from wrcore.errors.column_files import read_table
 
 POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0, "s_m": 1e6, "pitch_rad": 1e6}
 MOTION_LIMITS = {"V_m_per_s": 200.0, "omega_rad_per_s": 4e3, "vy_m_per_s": 200.0, "yaw_rate_rad_per_s": 1e3, "mu": 2.0}
-"""Columns of poses and of their motion, and the greatest value that is taken for the unit."""
+"""Columns of positions, attitudes and motion, and the maximum magnitude accepted in the unit of each."""
 
 _NOT_NEGATIVE = ("V_m_per_s", "mu")
 _WANTED = ("pose_id", "y_m", "yaw_rad")

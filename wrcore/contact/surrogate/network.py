@@ -77,11 +77,11 @@ class SurrogateWork(NamedTuple):
     next_layer: np.ndarray
     """(widest layer,)."""
     outputs: np.ndarray
-    """(outputs,), padded: those of the network times the share that counts (`trust_in`)."""
+    """(outputs,), padded: outputs of the network times their weight (`trust_in`)."""
 
 
 def no_surrogate():
-    """`Surrogate` of a scene without it."""
+    """Return the empty `Surrogate` of a scene without a network."""
     none = np.zeros(0)
     layers = Layers(*[np.zeros((0, 0), np.float32), none] * 4)
     return Surrogate(*[none] * 5, layers, none, np.zeros((0,) * 4))
@@ -101,7 +101,7 @@ def _padded(values):
 
 
 def packed(z):
-    """`Surrogate` from the arrays of a file of weights by name."""
+    """Return the `Surrogate` from the arrays of a file of weights by name."""
     layers, inputs = [], N_DESCRIPTORS
     for k in (1, 2, 3, 4):
         weights, biases = _padded(z[f"weights_{k}"]), _padded(z[f"biases_{k}"])
@@ -151,7 +151,7 @@ def _mode_splines(z):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _dense(inputs, weights, biases, outputs, bend):
-    """One layer; ``bend``: with the activation. The sums of `WIDTH` outputs stay in registers."""
+    """Evaluate one layer of the network, with activation if ``bend``; sums of `WIDTH` outputs stay in registers."""
     for start in range(0, len(biases), WIDTH):
         j = np.uint64(start)
         x = lanes.take32(biases, j)
@@ -164,12 +164,12 @@ def _dense(inputs, weights, biases, outputs, bend):
 
 @jit(allocates=False, fastmath=FAST)
 def trust_in(surrogate, descriptors):
-    """Share of the network's outputs that counts: 1 in the range of the training and one width of it beyond, falling
+    """Weight of the network's outputs: 1 in the range of the training and up to one width beyond it, then falling
     smoothly to 0 over the next width.
 
-    Each descriptor counts by the square of how far it is beyond, over the width of its range. Just outside the range
-    the network is still better than its base: on a curve of 250 m, 95 % of the errors in N are below 0.9 %, and below
-    5 % where the share begins to fall at the range itself (measured once)."""
+    The weight depends on the sum of squared distances of the descriptors beyond these limits, over the width of their
+    ranges. Just outside the range the network is still better than its base: on a curve of 250 m, 95 % of the
+    errors in N are below 0.9 %, and below 5 % where the share begins to fall at the range itself (measured once)."""
     outside = 0.0
     for i in range(N_DESCRIPTORS):
         below, above = surrogate.least[i] - descriptors[i], descriptors[i] - surrogate.greatest[i]
@@ -181,7 +181,7 @@ def trust_in(surrogate, descriptors):
 
 @jit(allocates=False, fastmath=FUSED)
 def run_network(surrogate, work):
-    """Fill ``work.outputs`` from ``work.descriptors``, and return the share of them that counts (`trust_in`)."""
+    """Fill ``work.outputs`` from ``work.descriptors``, and return their weight (`trust_in`)."""
     layers = surrogate.layers
     for i in range(N_DESCRIPTORS):
         x = (work.descriptors[i] - surrogate.median[i]) * surrogate.per_scale[i]
