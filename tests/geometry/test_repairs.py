@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from wrcore.errors import InputError
+from wrcore.errors.messages import _say_once
 from wrcore.geometry.irregularity import read_irregularity
 from wrcore.geometry.profiles.files import read_profile
 from wrcore.geometry.profiles.standards import named_profile
-from wrcore.kernels.cache import _say_once
 
 U = np.linspace(-0.060, 0.055, 1151)
 POINTS = 1e3 * U, 1e3 * named_profile("S1002", "wheel")(U)

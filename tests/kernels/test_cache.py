@@ -10,8 +10,9 @@ import pytest
 
 from wrcore.creep import table as table_module
 from wrcore.creep.table import ensure_table, table_path
+from wrcore.errors.messages import _say_once, warn, warnings_suppressed
 from wrcore.kernels import cache as cache_module
-from wrcore.kernels.cache import _say_once, cache_root, source_digest, untold, warn
+from wrcore.kernels.cache import cache_root, source_digest
 
 
 @pytest.fixture
@@ -197,7 +198,7 @@ def test_numba_without_compilation_is_one_clear_line():
 
 
 def test_what_is_untold_is_told_later(wanted, capsys):
-    with untold():
+    with warnings_suppressed():
         warn("a worn profile")
     assert capsys.readouterr().err == ""
     warn("a worn profile")

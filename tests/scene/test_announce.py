@@ -5,9 +5,8 @@ import time
 import pytest
 
 from tests.conftest import ELLIPTIC
-from wrcore.kernels.cache import _say_once
+from wrcore.errors.messages import _say_once, say_if_long
 from wrcore.kernels.jit import jit
-from wrcore.kernels.told import say_if_long, warn_once
 from wrcore.scene import compile as scene_compile
 from wrcore.scene import creep
 from wrcore.scene.creep import announce, creep_of
@@ -38,9 +37,8 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
 
 def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
-    monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
-    for each in (_say_once, warn_once):
-        each.cache_clear()
+    monkeypatch.setattr("wrcore.errors.messages.PATIENCE", 0.0)
+    _say_once.cache_clear()
     for factor in (2.0, 3.0):
         assert jit(lambda x, factor=factor: factor * x + 1.0, cache=False)(1.0) == factor + 1.0
     (said,) = capsys.readouterr().err.splitlines()
@@ -49,7 +47,7 @@ def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
 
 def test_no_line_where_none_is_wanted(monkeypatch, capsys):
     monkeypatch.setenv("WRCORE_PROGRESS", "0")
-    monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
+    monkeypatch.setattr("wrcore.errors.messages.PATIENCE", 0.0)
     announce("work")
     with say_if_long("work that takes long"):
         time.sleep(0.05)

@@ -22,9 +22,9 @@ from wrcore.contact.search.detection import axle_direction, find_patches
 from wrcore.equations.many_models import equations_of
 from wrcore.equations.model import frictionless, independent_at, internal_states, state_size
 from wrcore.errors import InputError
+from wrcore.errors.messages import warn
 from wrcore.forces.drive import undriven
 from wrcore.geometry.path import frame_turn, track_frame
-from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Handle
 from wrcore.track.flexible_track import rails_at
 from wrcore.track.track import TrackModel

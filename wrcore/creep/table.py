@@ -29,7 +29,8 @@ from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.kernels.cache import table_folder, warn
+from wrcore.errors.messages import warn
+from wrcore.kernels.cache import table_folder
 
 DEFAULT_TOLERANCE = 0.005
 """Default error of a table, over mu N. Critical speeds depend more on it than on the detection: that of the trailer

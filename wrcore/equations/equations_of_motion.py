@@ -24,9 +24,9 @@ from wrcore.equations.kernels import with_kernels
 from wrcore.equations.model import independent_at, workspace
 from wrcore.forces.suspension import element_forces
 from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
+from wrcore.kernels.interrupts import raise_interrupted
 from wrcore.kernels.jit import FUSED, jit
 from wrcore.kernels.own import fault_in
-from wrcore.kernels.told import raise_interrupted
 from wrcore.track.track import rail_motions, turn_back_wrenches
 from wrcore.wheels.contact_model import EVALUATIONS, contact_of
 from wrcore.wheels.force import press_wheels

@@ -16,8 +16,8 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
+from wrcore.errors.messages import warn
 from wrcore.geometry.spline import clamped_cubics
-from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
 
 CHANNELS = ("left_lateral", "left_vertical", "right_lateral", "right_vertical")

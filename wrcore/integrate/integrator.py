@@ -34,6 +34,7 @@ from wrcore.equations.model import state_size
 from wrcore.equations.own_law_failures import LawWatch, blame
 from wrcore.equations.pace import HALF_GAUGE, pace
 from wrcore.errors import InputError
+from wrcore.errors.messages import reaching
 from wrcore.forces.drive import may_drive
 from wrcore.integrate import choice, engine
 from wrcore.integrate.choice import CHOICES
@@ -44,7 +45,6 @@ from wrcore.integrate.tolerances import LENGTH, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.jacobian.block_elimination import new_system
 from wrcore.kernels.aside import planning
-from wrcore.kernels.told import reaching
 from wrcore.wheels.contact_model import ON_FIXED, ON_GRID, OUT_OF_RANGE, OUTSIDE_TRAINING, SOLVED
 
 METHODS = (*EXPLICIT, *ROSENBROCK)

@@ -10,13 +10,13 @@ import os
 import re
 import shutil
 import stat
-import sys
 import tempfile
 import time
-from contextlib import contextmanager, suppress
-from contextvars import ContextVar
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+from wrcore.errors.messages import warn
 
 KERNEL_ROOMS = (
     "kernels", "geometry", "bodies", "contact", "creep", "wheels", "track", "forces", "equations", "jacobian",
@@ -150,33 +150,3 @@ def drop_unused(folder, pattern):
 def _remove_temporary(root, process):
     if os.getpid() == process:  # not in a fork
         shutil.rmtree(root, ignore_errors=True)
-
-
-_UNTOLD = ContextVar("untold", default=False)
-
-
-@contextmanager
-def untold():
-    """Suppress warnings in this thread during a block, for input files that a computation itself has written."""
-    before = _UNTOLD.set(True)
-    try:
-        yield
-    finally:
-        _UNTOLD.reset(before)
-
-
-def warn(text):
-    """Print a warning on standard error, unless the process has printed it already or warnings are suppressed."""
-    if not _UNTOLD.get():
-        _say_once(text)
-
-
-@cache
-def _say_once(text):
-    say(text)
-
-
-def say(text):
-    """Print a line on standard error if the process has one."""
-    if sys.stderr is not None:  # in a process without a console
-        print(f"wrcore: {text}", file=sys.stderr, flush=True)

@@ -23,9 +23,9 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.typed_passes import NativeLowering
 
+from wrcore.errors.messages import say_if_long, warn
 from wrcore.kernels import aside
-from wrcore.kernels.cache import kernel_folder, sources_changed, warn
-from wrcore.kernels.told import say_if_long
+from wrcore.kernels.cache import kernel_folder, sources_changed
 
 _FOLDER = str(kernel_folder())
 

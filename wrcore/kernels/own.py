@@ -18,8 +18,8 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from wrcore.errors import InputError, short
+from wrcore.errors.messages import warn
 from wrcore.kernels.aside import planned
-from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Kernel, call_c
 from wrcore.kernels.jit import FUSED
 from wrcore.kernels.named_laws import function_of, name_of, said

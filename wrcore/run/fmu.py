@@ -25,9 +25,9 @@ import wrcore
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.errors.input_files import digest_of_file
+from wrcore.errors.messages import say
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.changing_rails.files import profiles_in, with_profiles
-from wrcore.kernels.cache import say
 from wrcore.kernels.named_laws import LawFile
 from wrcore.run.output.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start

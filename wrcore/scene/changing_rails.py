@@ -15,6 +15,7 @@ from wrcore.contact.changing_rails.section_table import BLEND, SectionTable
 from wrcore.contact.changing_rails.sections import REACH
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.errors.messages import warn
 from wrcore.geometry.changing_rails.crossing import Crossing
 from wrcore.geometry.changing_rails.files import read_slices
 from wrcore.geometry.changing_rails.joint import Joint
@@ -22,8 +23,6 @@ from wrcore.geometry.changing_rails.slices import RailSlices
 from wrcore.geometry.changing_rails.switch import Switch
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.cache import warn
-from wrcore.kernels.told import warn_once
 from wrcore.scene.kept_tables import kept_shape, kept_table
 from wrcore.scene.pairs import find_file
 from wrcore.track.changing_rails import crossing_of, layout_of_corrugation, layout_of_rail, layout_of_wheel
@@ -190,7 +189,7 @@ def _warn_of_swings(slices, where):
         worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
     if worst[0] > SWING:
         text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
-        warn_once(f"{where}: {text}: add slices there")
+        warn(f"{where}: {text}: add slices there")
 
 
 def read_corrugation(data, crossings, shapes, source):

@@ -16,7 +16,7 @@ from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
 from wrcore.creep.laws import LAWS, USER_LAW
 from wrcore.equations.model import Model
 from wrcore.errors import InputError
-from wrcore.kernels.told import tell
+from wrcore.errors.messages import tell
 from wrcore.scene.changing_rails import sections_under_wheels, warn_of_rigid_rails
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls

@@ -7,7 +7,7 @@ from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data, named_law, user_law
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.errors import InputError
-from wrcore.kernels.cache import say
+from wrcore.errors.messages import say
 from wrcore.scene.pairs import find_file
 
 

@@ -15,9 +15,9 @@ from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.contact.changing_rails.section_table import SectionTable, section_table, shape_table
 from wrcore.contact.changing_rails.sections import WheelOnSlices
 from wrcore.contact.search.geometry import ContactGeometry
+from wrcore.errors.messages import say_if_long
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, table_folder
-from wrcore.kernels.told import say_if_long
 
 FORM = 1
 """Version of these tables. Increase it with every change to the numbers in a table, so that cached tables are ignored

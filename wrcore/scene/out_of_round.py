@@ -7,11 +7,11 @@ import numpy as np
 from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
+from wrcore.errors.messages import warn
 from wrcore.geometry.changing_rails.files import read_slices
 from wrcore.geometry.changing_rails.slices import TURN
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.told import warn_once
 from wrcore.scene.changing_rails import STEEPEST_ALONG
 from wrcore.scene.pairs import find_file
 
@@ -102,9 +102,7 @@ def _sliced(spec, pair, field, folder, source):
     ends, strips = strips[[0, -1]], strips[first : last + 1]
     if max(strips[0] - ends[0], ends[1] - strips[-1]) > NARROWER:
         spans = [f"{1e3 * low:.0f} to {1e3 * high:.0f} mm" for low, high in (strips[[0, -1]], ends)]
-        warn_once(
-            f"{path}: sections reach from {spans[0]}, {wheel.name} from {spans[1]}: beyond, it is as at their ends"
-        )
+        warn(f"{path}: sections reach from {spans[0]}, {wheel.name} from {spans[1]}: beyond, it is as at their ends")
     around = np.linspace(0.0, TURN, 3601)
     f, _, rates = shape.slices.heights(around, strips)
     off = np.abs(f - wheel(strips))[:, np.abs(wheel(strips, 1)) < 1.0].max()

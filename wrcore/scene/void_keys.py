@@ -13,7 +13,7 @@ from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError, short
 from wrcore.errors.checked_yaml import keys_of
-from wrcore.kernels.told import tell
+from wrcore.errors.messages import tell
 
 
 class VoidKey(NamedTuple):

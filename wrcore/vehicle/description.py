@@ -11,8 +11,8 @@ from wrcore.bodies.marker import FRAME
 from wrcore.equations.model import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.messages import warn
 from wrcore.forces.suspension import PRELOAD, Elements
-from wrcore.kernels.cache import warn
 from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements

@@ -12,8 +12,9 @@ from wrcore.contact.patch.solution import solve_on_grid
 from wrcore.contact.search.approach import Pressed
 from wrcore.contact.search.reduction import PATCH_COLUMNS
 from wrcore.contact.search.strip import Pose
+from wrcore.errors.messages import say_if_long
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of
-from wrcore.kernels.told import handed_on, interrupted, say_if_long
+from wrcore.kernels.interrupts import handed_on, interrupted
 from wrcore.wheels.contact_model import COUNTERS, without_wheels
 from wrcore.wheels.exact_force import add_group
 from wrcore.wheels.hertzian_force import wheel_wrenches

@@ -37,8 +37,8 @@ from wrcore.analysis.wear.worn_rails import (
 from wrcore.analysis.wear.worn_rails import POINTS as RAIL_POINTS
 from wrcore.cli import main
 from wrcore.errors import InputError
+from wrcore.errors.messages import warnings_suppressed
 from wrcore.geometry.profiles.profile import ProfileCurve
-from wrcore.kernels.cache import untold
 from wrcore.scene.description import load_scene
 
 PLAN = {
@@ -448,7 +448,7 @@ def test_the_gauge_face_of_a_stored_rail_goes_on(curves, capsys):
     u, f = read_points(rail_file(curves["left"][0], 0, 0, "left", "laid"))
     new, gauge = scene.pair().rail, slice(0, u.size // 2)
     flank = -0.010 + 2.75 * (u - np.interp(-0.010, f[gauge], u[gauge]) - 2e-3)
-    with untold():
+    with warnings_suppressed():
         ground = softened(u, filled(u, np.minimum(f, flank)))
         stored, worn = (ProfileCurve.from_points(u, z, "rail") for z in (f, ground))
     assert capsys.readouterr().err == ""

@@ -21,8 +21,8 @@ from wrcore.contact.search.reduction import ANGLE, PENETRATION
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.errors.input_files import digest_of_all
+from wrcore.errors.messages import warn
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.cache import warn
 from wrcore.run.output.run import Run
 from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene, Source, friction_of, scene_of

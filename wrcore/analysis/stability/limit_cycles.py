@@ -22,9 +22,9 @@ from wrcore.analysis.stability.stability import at_speed, rising, straight_ahead
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
+from wrcore.errors.messages import PATIENCE, tell
+from wrcore.errors.messages import say as say_aloud
 from wrcore.integrate.integrator import METHODS, integrate
-from wrcore.kernels.cache import say as say_aloud
-from wrcore.kernels.told import PATIENCE, tell
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import Source, as_scene

@@ -37,10 +37,10 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import check_unchanged
+from wrcore.errors.messages import warnings_suppressed
 from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.cache import untold
 from wrcore.run.simulate import simulate
 from wrcore.scene.changes import changes_of
 from wrcore.scene.description import Scene, changed_by_file, load_scene
@@ -275,7 +275,7 @@ def profile_row(scene, folder, step, gone):
     qR_m (EN 15313, recalled), hollow_m and equivalent_conicity (3 mm).
     """
     u, now = read_points(file_of(folder, "profile", step))
-    with untold():
+    with warnings_suppressed():
         curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}", mends=False)
     new = read_points(file_of(folder, "profile", 0))[1]
     vehicle = scene.vehicle
@@ -370,11 +370,11 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
 def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
     path = file_of(folder, "profile", step).resolve()
-    with untold():
+    with warnings_suppressed():
         laid = worn_rails.rails_of_step(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
-        with untold():
+        with warnings_suppressed():
             present = load_scene(scene, changes)
         run = simulate(present, progress=False if quiet else None)
     except InputError as error:

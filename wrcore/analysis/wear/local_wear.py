@@ -32,8 +32,8 @@ from wrcore.analysis.wear.wear_laws import DENSITY, LAWS, Sliding, check_frictio
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
+from wrcore.errors.messages import warn
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.cache import warn
 from wrcore.run.output.derived import creep_work, rolling_speed
 from wrcore.run.output.run import Run
 from wrcore.run.progress import counted

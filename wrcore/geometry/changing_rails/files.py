@@ -25,9 +25,9 @@ import numpy as np
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.column_files import header_of, named_columns, read_column_file, split_unit
 from wrcore.errors.input_files import check_regular
+from wrcore.errors.messages import warn
 from wrcore.geometry.changing_rails.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
 from wrcore.geometry.profiles.files import read_points
-from wrcore.kernels.told import warn_once
 
 SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
 PLACES = {"rail": "s_m", "wheel": "angle_rad"}
@@ -181,7 +181,7 @@ def _read_slcs(path, how, kind):
         rows.append((number, (value + offset) * unit_of_place, name, columns, places[k] if features else None))
     lost = [f"{int(number)} {what}" for number, what in ((kinks, "kinks"), (steps, "accelerations")) if number]
     if lost:
-        warn_once(f"{path}: {' and '.join(lost)} not kept: the surface stays smooth along the {kind}")
+        warn(f"{path}: {' and '.join(lost)} not kept: the surface stays smooth along the {kind}")
     return _assembled(path, [("", rows)], kind, method == 1)
 
 

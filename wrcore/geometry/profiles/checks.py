@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.kernels.cache import warn
+from wrcore.errors.messages import warn
 
 LARGEST, SMALLEST = 1.0, 5e-3
 """Largest size and smallest width of a profile, m; they detect wrong units."""

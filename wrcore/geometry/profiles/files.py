@@ -19,11 +19,11 @@ import numpy as np
 
 from wrcore.errors import InputError, one_of
 from wrcore.errors.column_files import read_column_file, read_text, split_unit
+from wrcore.errors.messages import warn
 from wrcore.geometry.profiles import meters as profile_meters
 from wrcore.geometry.profiles.checks import UNITS, Mends, check_extent, likely_unit
 from wrcore.geometry.profiles.meters import METER_FILES, VAMPIRE_FILES, Stated
 from wrcore.geometry.profiles.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
-from wrcore.kernels.cache import warn
 
 _SIMPACK = (".prw", ".prr")
 POINT_FILES = (".csv", ".dat", ".txt", *_SIMPACK, *METER_FILES, *VAMPIRE_FILES)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.errors.messages import warn
 from wrcore.geometry.profiles.checks import Mends, check_extent, check_rail, check_sides, check_wheel
 from wrcore.geometry.profiles.smoothing import even_out
-from wrcore.kernels.cache import warn
 
 if TYPE_CHECKING:  # a third of a second that runs with standard profiles need not wait
     from scipy.interpolate import BSpline

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.errors.messages import warn
 from wrcore.geometry.irregularity import irregularity_extents
-from wrcore.kernels.told import warn_once
 from wrcore.scene.description import Scene
 
 SLACK, SLACK_M = 0.01, 1.0
@@ -159,4 +159,4 @@ def _warn_ahead(scene: Scene, ends: dict[str, float]) -> None:
 
 
 def _warn(scene: Scene, one: Extent, text: str) -> None:
-    warn_once(f"{scene.source}: {one.field}: {one.what} {text}")
+    warn(f"{scene.source}: {one.field}: {one.what} {text}")

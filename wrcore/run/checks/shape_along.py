@@ -15,9 +15,9 @@ import numpy as np
 from wrcore.contact.changing_rails.out_of_round import STEP, SlicedWheel
 from wrcore.contact.changing_rails.sections import AHEAD, BEND, HEIGHT, WheelOnSlices
 from wrcore.contact.search import reduction
+from wrcore.errors.messages import warn
 from wrcore.geometry.changing_rails.slices import TURN, RailSlices
 from wrcore.geometry.track import SIDES
-from wrcore.kernels.cache import warn
 
 ROUGH = 0.05
 """Largest difference between the gap on a strip of a patch and the parabola of the strips, relative to the patch's

@@ -23,8 +23,9 @@ from wrcore.contact.patch.model import NODES, NUMBERS, PairTable
 from wrcore.contact.rolling.rolling import LEVELS as RESOLUTIONS
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
-from wrcore.kernels.told import PATIENCE, handed_on, interrupted, reached_so_far, say_if_long, tell, warn_once
+from wrcore.errors.messages import PATIENCE, reached_so_far, say_if_long, tell, warn
+from wrcore.kernels.cache import drop_unused, source_digest, table_folder
+from wrcore.kernels.interrupts import handed_on, interrupted
 from wrcore.wheels.contact_model import without_wheels
 from wrcore.wheels.table.cells import (
     BESIDE,
@@ -101,7 +102,7 @@ class Pair(PairSolver):
                 return
             self._reached = reached_so_far()
             if self._full():
-                warn_once(f"{self.path}: no room for more cells; patches in others are solved")
+                warn(f"{self.path}: no room for more cells; patches in others are solved")
                 return
             with handed_on("patches are solved without a table"):  # or the cell stays as if never met
                 own = self._own(key)
