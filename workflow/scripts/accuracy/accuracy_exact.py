@@ -1,4 +1,4 @@
-"""One scene with exact contact at two resolutions: the run that models are compared with, and what it depends on."""
+"""Run one scene with exact contact at two resolutions; the finer run is the reference for errors of models."""
 
 import sys
 

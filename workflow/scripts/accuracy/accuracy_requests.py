@@ -1,4 +1,4 @@
-"""Accuracies asked for on random scenes, against two tight runs of each."""
+"""Test whether runs reach the requested accuracy on random scenes, by two tight runs of each scene."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Run every choice on one scene, timed, and compare it with the reference, its model's twin and exact contact."""
+"""Run and time every choice on one scene; compare with the reference, a tight run of its model and exact contact."""
 
 import sys
 

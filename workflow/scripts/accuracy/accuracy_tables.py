@@ -1,4 +1,4 @@
-"""Build the creep tables that the study compares, so that no timed run has to."""
+"""Build the creep tables that the study compares before the timed runs, which then only load them."""
 
 import sys
 

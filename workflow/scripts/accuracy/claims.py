@@ -1,4 +1,4 @@
-"""What reports/accuracy.md promises: medians and worst cases."""
+"""Tabulate the errors that reports/accuracy.md states: median, 95 % and maximum."""
 
 import sys
 from pathlib import Path

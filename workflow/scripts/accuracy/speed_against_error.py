@@ -1,4 +1,4 @@
-"""Speed against error of all scenes: figure, front, what to choose for which accuracy, and what models err."""
+"""Speed against error of all scenes: figure, Pareto front, recommended choices by accuracy, errors of models."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Contact points, contact angle, rolling radius difference and equivalent conicity of the study's pairs."""
+"""Compute contact points, contact angle, rolling radius difference and conicity of the study's wheel-rail pairs."""
 
 import sys
 

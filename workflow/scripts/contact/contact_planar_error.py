@@ -1,4 +1,4 @@
-"""What planar detection misses, over yaw and contact angle."""
+"""Compute and plot errors of planar detection over yaw and contact angle."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Both reductions: continuity of the force, patches that coexist and merge, agreement with CONTACT."""
+"""Compare both reductions: continuity of the force, coexisting and merging patches, errors relative to CONTACT."""
 
 import sys
 

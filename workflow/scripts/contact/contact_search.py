@@ -1,4 +1,4 @@
-"""The contact search against a dense one at random poses."""
+"""Compare the contact search with a dense search at random positions of a wheelset."""
 
 import sys
 

@@ -1,1 +1,1 @@
-"""Speed against error of every choice."""
+"""Computing speed against error of every modelling and integration choice."""

@@ -1,4 +1,4 @@
-"""What reports/accuracy.md promises, as medians and worst cases, and of which cases: from tables of the study."""
+"""Errors that reports/accuracy.md states, as median, 95 % and maximum over named cases, from tables of the study."""
 
 import pandas as pd
 
@@ -11,7 +11,7 @@ CONTACT = {
 """Columns of `study.contact.reference.compare_with_contact`: name, factor to the printed unit, and unit."""
 
 NEAR = 6e-3
-"""Lateral positions up to here are shown apart, m: beyond, wheels stand on their flanges."""
+"""Largest lateral position of the rows "y up to 6 mm", m; wheels stand on their flanges at larger ones."""
 
 
 def _row(what, of, cases, values, unit):
@@ -21,8 +21,9 @@ def _row(what, of, cases, values, unit):
 
 
 def contact_claims(cases):
-    """Errors of the contact search and both reductions against CONTACT, from
-    `study.contact.reference.compare_with_contact`: what, of (the reduction), cases, count, median, q95, worst, unit.
+    """Return errors of both reductions relative to CONTACT, from `study.contact.reference.compare_with_contact`.
+
+    Columns: what (the quantity), of (the reduction), cases, count, median, q95 (95 % quantile), worst, unit.
     """
     rows = []
     for (name, reduction), part in cases.groupby(["set", "reduction"], sort=False):
@@ -34,8 +35,9 @@ def contact_claims(cases):
 
 
 def creep_claims(errors):
-    """Errors of creep laws against CONTACT (`study.creep.laws.error_table`), file by file and in all cases together, %
-    of mu N; columns as for `contact_claims`.
+    """Return errors of the creep force of each creep law relative to CONTACT, in % of μN.
+
+    Cases (`study.creep.laws.error_table`) are grouped by file, then all together; columns as for `contact_claims`.
     """
     known = errors[errors["against"] == "CONTACT"]
     rows = []
@@ -46,7 +48,10 @@ def creep_claims(errors):
 
 
 def patch_claims(summary):
-    """Errors of patch models against exact contact (`study.patch.tables.summary`); columns as for `contact_claims`."""
+    """Return errors of patch models relative to exact contact, from `study.patch.tables.summary`.
+
+    Columns are those of `contact_claims`.
+    """
     named = summary.rename(columns={"quantity": "what", "model": "of"})
     return named.assign(cases="poses " + named["zone"])[
         ["what", "of", "cases", "count", "median", "q95", "worst", "unit"]
@@ -54,7 +59,10 @@ def patch_claims(summary):
 
 
 def speed_claims(front):
-    """Real-time factors on the fronts of speed against error: least, median, greatest of each kind and accuracy."""
+    """Return minimum, median and maximum real-time factor by kind of scene and speed.
+
+    Only choices on the fronts of speed against error with an error of y below 10 µm (RMS) are included.
+    """
     sound = front[front["y_rms_m"] < 1e-5]
     rows = [
         {"what": f"times real time, {kind}", "of": "choices below 10 µm", "cases": f"{speed:g} m/s", "count": len(part),
@@ -66,12 +74,12 @@ def speed_claims(front):
 
 
 def claims(cases, errors, patches, front):
-    """All of them in one table; arguments as for the parts."""
+    """Concatenate the tables of contact, creep, patch and speed; arguments as for these functions."""
     parts = contact_claims(cases), creep_claims(errors), patch_claims(patches), speed_claims(front)
     return pd.concat(parts, ignore_index=True)
 
 
 def claims_markdown(table):
-    """The table for reading."""
+    """Format the table of `claims` as Markdown."""
     shown = table.astype(object).where(table.notna(), "")
     return shown.to_markdown(index=False, floatfmt=".3g") + "\n"

@@ -1,7 +1,7 @@
-"""Speed against error: every modelling and integration choice run on a scene, timed, and compared with a reference.
+"""Speed against error: run and time every modelling and integration choice on a scene; compare with a reference.
 
-The reference runs with spatial detection, the moment reduction and the finest creep table at the tightest tolerance, by
-two independent integrators; their difference says how far the reference itself can be trusted.
+The reference runs use spatial detection, the moment reduction and the finest creep table at the tightest tolerance.
+Two independent integrators compute them; their difference estimates the error of the reference.
 """
 
 import dataclasses
@@ -23,17 +23,17 @@ SIDES = ("left", "right")
 
 
 class Choice(NamedTuple):
-    """One way to run a scene."""
+    """Contact, creep and integration settings of one run of a scene."""
 
     detection: str
     patch: str
     creep: str
-    """Creep law; a table with the 99 % error it is built for, as in ``table 0.01``."""
+    """Name of the creep law; for a table, followed by its 99 % error tolerance: ``table 0.01``."""
     method: str
     rtol: float
 
     def overrides(self):
-        """Changes to a scene, as :func:`wrcore.load_scene` takes them."""
+        """Return these settings as changes to a scene for :func:`wrcore.load_scene`."""
         law, _, tolerance = self.creep.partition(" ")
         changes = [
             f"contact.detection={self.detection}",
@@ -52,7 +52,7 @@ class Choice(NamedTuple):
 
 
 def kind_of(scene):
-    """``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
+    """Return the kind of a scene: ``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
     vehicle = scene.vehicle
     if len(vehicle.body_names) > len(vehicle.wheelset_names):
         return "vehicle"
@@ -60,18 +60,23 @@ def kind_of(scene):
 
 
 def combinations(grids):
-    """All choices of several grids, lists by the names of :class:`Choice`'s fields, each once."""
+    """Return all distinct choices of several grids.
+
+    Each grid is a dict with a list of values for each field of :class:`Choice`.
+    """
     found = [Choice(*values) for grid in grids for values in product(*(grid[name] for name in Choice._fields))]
     return list(dict.fromkeys(found))
 
 
 def run_errors(run, reference, until=np.inf):
-    """How far a run is from its reference with the same output times, up to ``until`` (s): RMS and maximum of the
-    lateral position (m) over all wheelsets; RMS over all wheels of Q and Y (N), of Y alone, and of the normal force
-    over its mean; relative errors of mean wear number, creep power, and amplitude and frequency over the second half.
+    """Return the errors of a run relative to a reference with the same output times, up to ``until`` (s).
+
+    RMS and maximum error of the lateral position (m) cover all wheelsets. RMS errors of Q and Y together (N), of Y (N),
+    and of the normal force over its mean cover all wheels. Relative errors: mean wear number and creep power, and
+    amplitude and frequency of the leading wheelset over the second half. All are NaN if the run ends too early.
     """
     if run.t[-1] < min(until, reference.t[-1]) - 1e-9:
-        return dict.fromkeys(ERRORS, np.nan)  # did not get there
+        return dict.fromkeys(ERRORS, np.nan)  # the run stopped before `until`
     run, reference = (first_samples(r, min(run.t.size, reference.t.size)) for r in (run, reference))
     here = reference.t <= until
     names = wheelsets_of(reference)
@@ -107,7 +112,7 @@ def run_errors(run, reference, until=np.inf):
 
 
 def first_samples(run, count):
-    """A run as far as its first samples go."""
+    """Return a run cut to its first ``count`` samples."""
     if run.t.size == count:
         return run
     groups = {name: {key: values[:count] for key, values in group.items()} for name, group in run.groups.items()}
@@ -121,11 +126,11 @@ ERRORS = (
 
 
 SHOWN = ("y_rms_m", "N_rms_relative", "Y_rms_N", "T_gamma_relative")
-"""Errors that are kept of integration and model apart: lateral position, normal force, guiding force, wear number."""
+"""Errors listed separately for integration and model: lateral position, normal force, guiding force, wear number."""
 
 
 def part_of(errors, of):
-    """Errors that are shown, under names that say of what they are: ``integration`` or ``model``."""
+    """Return the errors of `SHOWN` with the prefix ``of``: ``integration`` or ``model``."""
     return {f"{of}_{name}": errors[name] for name in SHOWN}
 
 
@@ -133,7 +138,10 @@ COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
 
 
 def reference_runs(source, overrides, reference):
-    """Scene, its reference run and independent twin: creep as in :class:`Choice`, two methods and rtols."""
+    """Return the scene, its reference run and a second run with another integration method and tolerance.
+
+    ``reference`` contains creep (as in :class:`Choice`), methods and rtols (two each).
+    """
     scenes = [
         load_scene(source, [*overrides, *Choice("spatial", "moment", reference["creep"], method, rtol).overrides()])
         for method, rtol in zip(reference["methods"], reference["rtols"], strict=True)
@@ -142,7 +150,7 @@ def reference_runs(source, overrides, reference):
 
 
 def reference_row(scene, run, twin, until=np.inf):
-    """What is known of a reference: how far its twin is from it, and the kind of scene, in a table of one row."""
+    """Return one row with kind, speed and status of a reference run, and differences of its twin from it."""
     facts = {"kind": kind_of(scene), "speed_m_per_s": run.scene["speed"], "status": run.status}
     counters = {
         f"{name}_of_{which}": r.counters[name] for which, r in (("run", run), ("twin", twin)) for name in COSTS[:2]
@@ -151,13 +159,15 @@ def reference_row(scene, run, twin, until=np.inf):
 
 
 def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None, twins=None):
-    """Run every choice on a scene, in turn in each of some timed passes, so that a slow moment of the machine does not
-    hit one alone: a row per choice with its fields, status, errors against the reference up to ``until`` (s), least
-    wall time (s; that of a first run that looks contact up is one of solving), its spread (largest less least over the
-    median), real-time factor and counters.
+    """Run and time every choice on a scene and compare each with the reference.
 
-    With ``twins``, tight runs by model (`study.accuracy.models.twins`), errors of the integration against them are
-    added; ``progress`` wraps the choices of each pass.
+    Each timed pass runs all choices in turn, so that a slow moment of the machine affects all of them. Each row
+    contains a choice's fields, status, errors relative to the reference up to ``until`` (s), minimum wall time (s), its
+    spread (maximum less minimum, over the median), real-time factor and counters. A first run with the lookup table
+    of exact contact includes the time to solve its entries.
+
+    ``twins``, tight runs by model (`study.accuracy.models.twins`), add the errors of the integration relative to them.
+    ``progress`` wraps the choices of each pass.
     """
     scenes = {choice: load_scene(source, [*overrides, *choice.overrides()]) for choice in choices}
     rows, times = {}, {choice: [] for choice in choices}
@@ -180,14 +190,15 @@ def study(source, overrides, choices, reference, until=np.inf, repetitions=1, pr
 
 
 def pareto_front(table, error="y_rms_m", cost="wall_s"):
-    """Rows that no other row beats in both error and cost, from cheap and rough to dear and accurate."""
+    """Return the Pareto front of error and cost: rows in order of rising cost and falling error."""
     usable = table[(table["status"] == "completed") & table[error].notna()].sort_values([cost, error])
     return usable[usable[error] < usable[error].cummin().shift(fill_value=np.inf)]
 
 
 def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
-    """The cheapest choice of a table of :func:`study` for each wanted accuracy (largest error accepted, in its unit), a
-    row each; those that nothing reaches are left out.
+    """Return the cheapest choice of a table of :func:`study` for each accuracy, the maximum accepted error.
+
+    Accuracies have the unit of the column ``error``. Accuracies that no choice reaches have no row.
     """
     front = pareto_front(table, error, cost)
     rows = []
@@ -199,7 +210,7 @@ def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
 
 
 def recommendation_table(tables, accuracies):
-    """:func:`recommendations` of several scenes for accuracies in m, the title of the scene in front."""
+    """Return the cheapest choices (:func:`recommendations`) of several scenes for accuracies in m, by title."""
     found = {title: recommendations(table, accuracies) for title, table in tables.items()}
     table = pd.concat([rows.assign(scene=title) for title, rows in found.items()])
     apart = [f"{of}_{name}" for of in ("integration", "model") for name in SHOWN if f"{of}_{name}" in table]
@@ -207,8 +218,9 @@ def recommendation_table(tables, accuracies):
 
 
 def front_table(tables, references):
-    """Fronts of several scenes, the choices that no other beats, from :func:`study` and :func:`reference_row` by title:
-    kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
+    """Return the Pareto fronts of several scenes, from tables of :func:`study` and :func:`reference_row` by title.
+
+    Columns: kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
     """
     columns = [*Choice._fields, "y_rms_m", "N_rms_relative", "real_time_factor"]
     parts = [

@@ -22,11 +22,11 @@ MODELS = (
 """Kinds of model: label, colour (Okabe-Ito; dark to light in grey) and marker."""
 
 INTEGRATION, MODEL = "#0072B2", "#E69F00"
-"""Colours of the errors of integration and model: dark and full against light and open in grey."""
+"""Colours of the errors of integration and model; in greyscale, filled dark marks and open light marks differ."""
 
 
 def model_kind(row, finest):
-    """Which of ``MODELS`` a row of the study belongs to."""
+    """Return the label in ``MODELS`` of a row of the study."""
     if row["patch"] != "moment":
         return MODELS[5 if row["patch"] == "tabulated" else 6][0]
     if row["detection"] != "spatial":
@@ -41,13 +41,14 @@ def model_kind(row, finest):
 
 @styled
 def speed_against_error(tables, finest, doubts=None, resolved=None):
-    """Real-time factor over error, a panel per scene (tables of :func:`study.accuracy.errors.study` by title): every
-    choice, its errors of integration and of model apart.
+    """Plot the real-time factor over the error of y, a panel per scene.
 
-    With the columns of `study.accuracy.models` markers tell kinds of models, full at the error of a choice's
-    integration, open at that of its model; without, marks are at the difference from the reference (creep ``finest``),
-    coloured by kind. Below the lines, differences between the two reference runs (``doubts``) and the two with exact
-    contact (``resolved``; RMS, m), errors, and errors of models, mean nothing.
+    ``tables`` of :func:`study.accuracy.errors.study` are given by title. With columns of `study.accuracy.models`, the
+    marker shows the kind of model: filled at the error of the integration, open at the error of the model. Without
+    them, marks show the difference from the reference (creep ``finest``), coloured by kind of model.
+
+    Vertical lines (RMS, m) show differences between the two reference runs (``doubts``) and between the two runs with
+    exact contact (``resolved``). Smaller errors, or smaller errors of models, are not resolved.
     """
     rows = -(-len(tables) // 2)
     figure = Figure(figsize=(7.4, 1.1 + 2.5 * rows), layout="constrained")
@@ -71,7 +72,7 @@ def speed_against_error(tables, finest, doubts=None, resolved=None):
         if resolved and title in resolved:
             axes.axvline(resolved[title], color=MODEL, ls="--", lw=0.9, label="resolution of exact contact")
         axes.set(xscale="log", yscale="log", xlabel="error of y, rms / m", ylabel="real-time factor / 1")
-        if doubts:  # often far below all marks: the range is theirs
+        if doubts:  # their difference is often far below all marks, which set the range
             axes.set_xlabel(f"error of y, rms / m (references: {doubts[title]:.0e} m)")
             axes.set_xlim(left=least)
         axes.set_title(title, loc="left")
@@ -82,14 +83,14 @@ def speed_against_error(tables, finest, doubts=None, resolved=None):
 
 
 def _least_error(rows):
-    """Smallest error above zero that is drawn, m."""
+    """Return the smallest plotted error above zero, m."""
     columns = [name for name in ("integration_y_rms_m", "model_y_rms_m") if name in rows] or ["y_rms_m"]
     values = rows[columns].to_numpy()
     return min(values[values > 0.0], default=1.0)
 
 
 def _marks(axes, rows, label, color, marker, apart):
-    """Marks of the choices of one kind of model."""
+    """Plot the marks of the choices of one kind of model."""
     speed, size = rows["real_time_factor"], {"s": 9, "marker": marker, "lw": 0.7}
     if not apart:
         axes.scatter(rows["y_rms_m"], speed, c=color, label=label, **size)

@@ -1,12 +1,13 @@
-"""The measured fronts as reports/accuracy.md quotes them."""
+"""Markdown table of the measured Pareto fronts for reports/accuracy.md."""
 
 from wrcore.run.accuracy import measured_front
 
 
 def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
-    """The fastest measured choice (by default of the package's front) for each accuracy (RMS of the lateral position,
-    m) as a table in Markdown, as reports/accuracy.md quotes it; left out are accuracies that nothing reaches and those
-    for which the choice is that of the next smaller one.
+    """Return a Markdown table of the fastest measured choice for each accuracy (RMS error of y, m).
+
+    ``front`` is the package's measured front by default. Accuracies that no choice reaches have no row, nor have
+    accuracies with the same choice as the next smaller accuracy.
     """
     front = measured_front() if front is None else front
     head = ("scene", "error below", "detection, creep, method, rtol", "error", "of N", "times real time")

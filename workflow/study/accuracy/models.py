@@ -1,7 +1,7 @@
-"""The error of a model apart from the error of its integration: tight runs of every model, and runs with exact contact.
+"""Errors of models, separated from errors of their integration.
 
-A run differs from the truth by what its integrator errs and by what its model leaves out. The first is its difference
-from a tight run of the same model, its twin; the second is the twin's difference from a run with exact contact.
+The error of integration of a run is its difference from a run of the same model at tight tolerance, its twin. The
+error of a model is the difference of its twin from a run with exact contact.
 """
 
 import pandas as pd
@@ -11,16 +11,19 @@ from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
 MODEL = ("detection", "patch", "creep")
-"""What makes a choice's model."""
+"""Fields of a choice that define its model."""
 
 
 def model_of(choice):
-    """Detection, patch and creep of a choice or a row of choices."""
+    """Return detection, patch and creep of a choice or of a row of a table of choices."""
     return tuple(getattr(choice, name) for name in MODEL)
 
 
 def twins(source, overrides, choices, reference, method, rtol):
-    """A tight run of every model of the choices, by `model_of`; ``reference`` is one that is there, (Choice, Run)."""
+    """Return a run at tight tolerance for each model of the choices, by `model_of`.
+
+    ``reference`` is a pair (Choice, Run) that is used without a new run.
+    """
     found = {model_of(reference[0]): reference[1]}
     for choice in choices:
         if model_of(choice) not in found:
@@ -30,8 +33,9 @@ def twins(source, overrides, choices, reference, method, rtol):
 
 
 def exact_runs(source, overrides, exact, duration):
-    """Runs with exact contact over a duration (s) at two resolutions, finer and coarser: the changes to the scene of
-    these names in ``exact``, beside its method and rtol.
+    """Return runs with exact contact over a duration (s) at two resolutions, finer and coarser.
+
+    ``exact`` contains method, rtol, and the changes to the scene under ``finer`` and ``coarser``.
     """
     rtol = exact["rtol"]
     common = [*overrides, f"integration.duration={duration}", f"integration.method={exact['method']}"]
@@ -43,14 +47,16 @@ def exact_runs(source, overrides, exact, duration):
 
 
 def exact_row(finer, coarser):
-    """What exact contact's resolution does to a run, and what the runs cost: a table of one row."""
+    """Return one row with differences of the coarser from the finer run with exact contact, and wall times (s)."""
     costs = {f"{name}_wall_s": run.counters["wall_s"] for name, run in (("finer", finer), ("coarser", coarser))}
     return pd.DataFrame([{"duration_s": finer.t[-1]} | part_of(run_errors(coarser, finer), "model") | costs])
 
 
 def with_model_errors(table, tight, exact=None):
-    """Table of `study.accuracy.errors.study` with columns of the model's errors, the same for all choices of a model,
-    from the tight runs of `twins`; NaN without a run with exact contact, compared up to its end.
+    """Add columns with the errors of the model to a table of `study.accuracy.errors.study`.
+
+    They compare the tight runs of `twins` with the run with exact contact up to its end; NaN without such a run.
+    All choices of a model have equal values.
     """
     until = float("inf") if exact is None else float(exact.t[-1])
     found = {
@@ -62,8 +68,10 @@ def with_model_errors(table, tight, exact=None):
 
 
 def model_table(tables, exacts):
-    """Errors of all models of all scenes (tables of `with_model_errors` by title), with what exact contact's own
-    resolution does (`exact_row`) in front; scenes without the latter are left out.
+    """Return errors of all models of all scenes, from tables of `with_model_errors` by title.
+
+    The first row of each scene is the effect of the resolution of exact contact (`exact_row`). Scenes without this row
+    are omitted.
     """
     columns = [f"model_{name}" for name in SHOWN]
     parts = []
@@ -75,5 +83,5 @@ def model_table(tables, exacts):
 
 
 def reference_choice(reference):
-    """`Choice` of the reference run; arguments as in the configuration."""
+    """Return the `Choice` of the reference run from its entry in the configuration."""
     return Choice("spatial", "moment", reference["creep"], reference["methods"][0], reference["rtols"][0])

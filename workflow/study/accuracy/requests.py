@@ -1,7 +1,7 @@
-"""Is an accuracy that was asked for reached? Random scenes of all kinds, each request against two tight runs.
+"""Test of `simulate_to_accuracy` on random scenes: whether runs reach the requested accuracy.
 
-The two tight runs are by other methods and tolerances than the runs they judge. A request is judged only where they
-agree well below what was asked for: elsewhere (hunting that amplifies, impacts) nobody knows the right answer.
+Two runs at tight tolerance, by other methods than the tested runs, are the reference. A request is tested only if
+their difference is well below the requested accuracy. Elsewhere (unstable hunting, impacts) no reference exists.
 """
 
 import numpy as np
@@ -14,26 +14,27 @@ from wrcore.scene.description import load_scene
 KINDS = {
     "wheelset": (0.3, 1.5), "suspended_wheelset": (1.0, 4.0), "trailer_vehicle": (1.0, 2.0), "metro_car": (1.0, 1.5),
 }  # fmt: skip
-"""Scenes by name, in turn, and how long they run, s: a free wheelset reaches the flange soon, and after some impacts
-nothing is known about it."""
+"""Scenes by name and the range of their durations, s. A free wheelset soon reaches the flange, and after some impacts
+the two reference runs differ."""
 
 WHEELS, RAILS = ("S1002", "S1002", "cone:1/20"), ("UIC60-MBench", "60E1", "60E2", "54E1", "49E1")
 SPEEDS, FRICTIONS, RADII = (10.0, 80.0), (0.15, 0.5), (300.0, 5000.0)
-"""m/s; 1; m."""
+"""Ranges of speed, m/s; friction coefficient; curve radius, m."""
 
 LATERAL, GRAVITY, BASE = 0.7, 9.81, 1.5
-"""Uncompensated lateral acceleration in curves at most, m/s2; m/s2; distance of the contact points, m."""
+"""Maximum uncompensated lateral acceleration in curves, m/s²; gravity, m/s²; distance of the contact points, m."""
 
 CANT, RAMP = 0.15, 0.01
-"""Largest cant, m, and its largest change, m/m."""
+"""Maximum cant, m, and its maximum gradient, m/m."""
 
 DOUBT = 0.2
-"""Tight runs must differ by less than this part of what was asked for."""
+"""Maximum difference of the two tight runs as a fraction of the requested accuracy."""
 
 
 def random_scene(seed, seconds=1.0):
-    """A scene of random kind (by the seed's remainder), speed, friction, profiles, track and duration (times
-    ``seconds``): name of a scene file, and changes to it by key path.
+    """Return the name of a scene file and random changes to it by key path.
+
+    Speed, friction, profiles, track and duration (scaled by ``seconds``) are random; seeds take the kinds in turn.
     """
     rng = np.random.default_rng(seed)
     kind = list(KINDS)[seed % len(KINDS)]
@@ -56,7 +57,7 @@ def random_scene(seed, seconds=1.0):
 
 
 def _curve(rng, speed, duration):
-    """A curve with transition that is reached within a run, canted as its speed needs."""
+    """Return a track path with transition and curve that a run reaches, with a cant that suits the speed."""
     radius = max(float(np.exp(rng.uniform(*np.log(RADII)))), speed**2 / (LATERAL + GRAVITY * CANT / BASE))
     cant = min(CANT, max(0.0, (speed**2 / radius - rng.uniform(0.0, LATERAL)) * BASE / GRAVITY))
     lengths = np.round(speed * duration * np.array([0.2, 0.3]) + [1.0, 5.0], 1)
@@ -67,11 +68,13 @@ def _curve(rng, speed, duration):
 
 
 def judged(source, changes, requests, tight):
-    """Ask for accuracies of one scene, by the quantity of `wrcore.analysis.to_accuracy.QUANTITIES`, and compare what
-    was handed out with the first of two ``tight`` runs (method, rtol, longest_step).
+    """Simulate one scene to each requested accuracy and compare with the first of two ``tight`` runs.
 
-    A row per request: of, asked, stated, whether it counts as reached, rtol, cost, status, reason, error, doubt
-    (difference of the tight runs), trusted, ratio (error over asked).
+    ``requests`` are accuracies by quantity of `wrcore.analysis.to_accuracy.QUANTITIES`; ``tight`` contains method, rtol
+    and longest_step of each tight run.
+
+    A row per request: of (quantity), asked (accuracy), stated (error that the run reports), reached (as reported),
+    rtol, cost, status, reason, error, doubt (difference of the tight runs), trusted, ratio (error over asked).
     """
     scene = load_scene(source, changes)
     sure, twin = (
@@ -93,16 +96,17 @@ def judged(source, changes, requests, tight):
 
 
 def _apart(one, other, of):
-    """Difference of two runs; infinite where they end otherwise, or by more than an output time earlier or later."""
+    """Return the difference of two runs; infinite if status or end differ (by more than one output time)."""
     if one.status != other.status or abs(one.t.size - other.t.size) > 1:
         return np.inf
     return difference(one, other, of)
 
 
 def summary(table):
-    """How many requests of `judged` were kept, by quantity and accuracy: of, asked, requests, trusted; of the trusted
-    ones reached, missed (said to be reached, but erred by more) and worst ratio of those said to be reached; median and
-    largest cost of all.
+    """Count the requests of `judged` that were reached, by quantity and accuracy.
+
+    Columns: of, asked, requests, trusted; among the trusted requests reached (as reported), missed (reported as
+    reached, but with a larger error) and worst_ratio; median and maximum cost of all requests.
     """
     rows = []
     for (of, asked), part in table.groupby(["of", "asked"], sort=False):

@@ -1,1 +1,1 @@
-"""Geometry of pairs, error of planar detection, reductions, the search against a dense one."""
+"""Geometry of wheel-rail pairs, error of planar detection, errors of reductions, test of the contact search."""

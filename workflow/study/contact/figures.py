@@ -1,5 +1,4 @@
-"""Figures of the contact geometry: where the contact lies, what it does to the radii, and the conicity; what planar
-detection misses; what the reductions do to the force.
+"""Figures of contact position, rolling radius difference, conicity, errors of planar detection, and reductions.
 
 The first ones work on the table of `wrcore.contact.rigid.first_touch.first_touch` and on curves of
 `wrcore.contact.rigid.conicity.conicity_curve`, the others on tables of `study.contact.tables`. Units change here and
@@ -22,14 +21,14 @@ STYLES = (
     {"color": "#009E73", "linestyle": (0, (1, 1))},
     {"color": "#CC79A7", "linestyle": "-."},
 )
-"""Okabe-Ito colours, each with its own line: told apart in grey too."""
+"""Okabe-Ito colours, each with a different line style, to be distinguished in greyscale."""
 
 THIN = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
 
 
 @styled
 def fig_rolling_radius_difference(tables):
-    """Rolling radius difference over the lateral shift, from tables of `first_touch` by label."""
+    """Plot rolling radius difference over lateral shift, from tables of `first_touch` by label."""
     figure, axes = _single()
     for style, (label, table) in zip(STYLES, tables.items(), strict=False):
         axes.plot(MM * table.y_m, MM * table.rolling_radius_difference_m, label=label, **style)
@@ -40,8 +39,9 @@ def fig_rolling_radius_difference(tables):
 
 @styled
 def fig_contact_angle(tables):
-    """Contact angles of both sides over the lateral shift, from tables of `first_touch` by label; they are rotations
-    about x: positive on a left wheel, negative on a right one.
+    """Plot contact angles of both sides over lateral shift, from tables of `first_touch` by label.
+
+    Angles are rotations about x: positive on a left wheel, negative on a right wheel.
     """
     figure, axes = _single()
     for style, (label, table) in zip(STYLES, tables.items(), strict=False):
@@ -55,8 +55,9 @@ def fig_contact_angle(tables):
 
 @styled
 def fig_conicity(curves, reference=None):
-    """Equivalent conicity over the amplitude, from `conicity_curve` by label, with the tolerance band of EN 15302
-    around a reference (amplitudes (m) and values).
+    """Plot equivalent conicity over amplitude, from `conicity_curve` by label.
+
+    A ``reference`` (amplitudes (m) and values) is drawn with the tolerance band of EN 15302.
     """
     figure, axes = _single()
     if reference is not None:
@@ -74,7 +75,7 @@ def fig_conicity(curves, reference=None):
 
 @styled
 def fig_conicity_of_pairs(table):
-    """Equivalent conicity of several pairs (`conicity_table`) over the amplitude, with and without roll."""
+    """Plot equivalent conicity of several pairs (`conicity_table`) over amplitude, with and without roll."""
     figure, axes = _single()
     for style, (label, rows) in zip(STYLES, table.groupby("pair", sort=False), strict=False):
         amplitude = MM * rows.amplitude_m
@@ -88,7 +89,7 @@ def fig_conicity_of_pairs(table):
 
 @styled
 def fig_location_with_yaw(table):
-    """Left contact point across the wheel and along the rail over the shift for several yaws (`location_with_yaw`)."""
+    """Plot lateral and longitudinal position of the left contact over shift and yaw (`location_with_yaw`)."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     across, along = figure.subplots(1, 2)
     left = table[table.side == "left"]
@@ -105,7 +106,7 @@ def fig_location_with_yaw(table):
 
 
 BANDS = ((0.018, 0.140), (0.280, 0.560), (1.080, 1.240))
-"""Contact angles on the tread, in the flange root and on the flange, rad; S1002 on UIC60 jumps over the rest."""
+"""Ranges of contact angle on tread, flange root and flange, rad; S1002 on UIC60 has no contact at other angles."""
 
 
 _CELLS = 16
@@ -113,11 +114,12 @@ _CELLS = 16
 
 @styled
 def fig_planar_error(table):
-    """What planar detection misses (`planar_error_map`), over yaw and contact angle, with the first-order law as
-    contours, in `BANDS`, flange on top: normal penetration, longitudinal position, penetration over the law, and bound
-    of ``detection: auto`` over missed penetration.
+    """Plot errors of planar detection (`planar_error_map`) over yaw and contact angle in `BANDS`, flange on top.
 
-    Cells stay empty where no pose has such a contact angle, or where planar detection has no patch there.
+    Panels: error of normal penetration, error of longitudinal position (both with the first-order law as contours),
+    error of penetration over this law, and error bound of ``detection: auto`` over error of penetration.
+
+    Cells are empty if no contact has such an angle, or if planar detection finds no patch there.
     """
     table = table[table.yaw_rad > 0]
     table = table.assign(ratio=table.missed_m / table.law_m, excess=table.bound_m / table.missed_m)
@@ -147,7 +149,7 @@ def fig_planar_error(table):
 
 
 def _error_band(axes, table, band, column, factor, norm):
-    """Cells of one band of contact angles."""
+    """Plot the cells of one band of contact angles."""
     limits = np.geomspace(*band, _CELLS + 1)
     grid = over_contact_angle(table, limits, column)
     yaw = MM * grid.columns.to_numpy()
@@ -160,7 +162,7 @@ def _error_band(axes, table, band, column, factor, norm):
 
 
 def _law_contours(axes, largest_yaw, band, column):
-    """Contours of the first-order laws of the missed penetration (um) and of the longitudinal shift (mm)."""
+    """Plot contours of the first-order errors of penetration (µm) and longitudinal position (mm)."""
     yaw, angle = np.meshgrid(np.linspace(largest_yaw / 30, largest_yaw, 80), np.linspace(*band, 60))
     if column == "missed_m":
         values, levels = 1e6 * first_order_law(yaw, angle), [1e-3, 1e-2, 0.1, 1, 10, 100, 300]
@@ -177,12 +179,12 @@ REDUCTION_LINES = {
     "maximum": {"color": "#CC79A7", "linestyle": "-", "linewidth": 0.8},
     "moment": {"color": "#009E73", "linestyle": (0, (4, 2))},
 }
-"""Not the colours of planar and spatial detection."""
+"""Line styles of the reductions; planar and spatial detection have other colours."""
 
 
 @styled
 def fig_lateral_sweep(sweep):
-    """Vertical force of a loaded pair swept sideways at fixed height (`lateral_sweep`), its steps per micrometre."""
+    """Plot the vertical force of a wheelset over lateral position at constant height (`lateral_sweep`)."""
     figure = Figure(figsize=(6.6, 4.6), layout="constrained")
     force, steps = figure.subplots(2, 1, sharex=True)
     y = MM * sweep.y_m.to_numpy()
@@ -201,7 +203,7 @@ def fig_lateral_sweep(sweep):
 
 @styled
 def fig_patch_forces(tables):
-    """Normal force of each left patch over the lowering (`force_over_height`): patches that coexist, and merge."""
+    """Plot the normal force of each left patch over the lowering of the wheel (`force_over_height`)."""
     figure = Figure(figsize=(7.6, 3.0), layout="constrained")
     panels = figure.subplots(1, len(tables), squeeze=False)[0]
     for axes, (title, table) in zip(panels, tables.items(), strict=True):

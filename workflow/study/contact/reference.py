@@ -1,4 +1,4 @@
-"""The reductions against CONTACT: position, height, normal force, contact angle and greatest pressure."""
+"""Errors of the reductions relative to CONTACT: position, height, normal force, contact angle, maximum pressure."""
 
 import math
 
@@ -33,20 +33,22 @@ ERRORS = {
     "p_max_relative": "greatest pressure",
     "approach_m": "approach",
 }
-"""Columns of `compare_with_contact` that are errors: ours less CONTACT's."""
+"""Columns of `compare_with_contact` that are errors, value of wrcore less value of CONTACT, with their meaning."""
 
 
 def compare_with_contact(geometry, reference, reductions=tuple(REDUCTIONS), detection="spatial"):
-    """Each case of CONTACT beside our patches, with either reduction: patches, the columns of `ERRORS`, ``inside`` (all
-    our points lie laterally within CONTACT's patch) and ``combined`` (CONTACT's one patch covers several of ours, with
-    a gap between them).
+    """Return errors of wrcore relative to CONTACT, a row per case and reduction.
 
-    Cases are in CONTACT's axes (y right, z down). Where we report several patches the position is that of their
-    resultant, angle and approach those of the most loaded one, and p_max the greatest.
+    Columns include patches (number of patches of wrcore), the columns of `ERRORS`, ``inside`` (all contact points of
+    wrcore lie laterally within CONTACT's patch) and ``combined`` (CONTACT's single patch covers several patches of
+    wrcore, with a gap between them).
 
-    CONTACT's vertical force includes that of friction (mu = 0.3, the wheel rolls with creepage), ours at rest does not:
-    on the flange the normal forces at equal vertical load differ by up to a half for that reason. Everything but
-    ``height_equal_load_m`` and ``normal_relative`` is therefore taken at equal normal force.
+    Cases are in CONTACT's axes (y right, z down). With several patches the position is that of their resultant; angle
+    and approach are those of the most loaded patch, and p_max is the maximum.
+
+    CONTACT's vertical force includes friction (mu = 0.3, the wheel rolls with creepage); wrcore's wheel at rest has no
+    friction. On the flange the normal forces at equal vertical load therefore differ by up to a half. Only
+    ``height_equal_load_m`` and ``normal_relative`` are taken at equal vertical load, the others at equal normal force.
     """
     rows = [
         _compare_case(geometry, case, reduction, detection == "spatial")
@@ -57,7 +59,7 @@ def compare_with_contact(geometry, reference, reductions=tuple(REDUCTIONS), dete
 
 
 def _compare_case(geometry, case, reduction, spatial):
-    """One row: the two heights; all that belongs to the patch at equal normal force."""
+    """Return one row of `compare_with_contact`; quantities of the patch are taken at equal normal force."""
     patches = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
     wheel = (geometry, hertz_table(), contact_modulus(**MATERIAL), SIDES[case.side], -1e-3 * case.y_ws_mm)
     pose, rule = (case.roll_rad, -case.yaw_rad, spatial, REDUCTIONS[reduction]), geometry.rolling_radius
@@ -90,14 +92,15 @@ def _compare_case(geometry, case, reduction, spatial):
 
 
 def _forces(wheel, pose, z, patches):
-    """Normal forces of a wheel at height ``z``; fills ``patches``."""
+    """Return the normal forces (N) of a wheel at height ``z`` (m); fill ``patches``."""
     count, _ = static_wheel_force(*wheel, z, *pose, patches)
     return patches[:count, NORMAL]
 
 
 def summarise(comparison):
-    """Mean, q90 and max of the absolute errors of `compare_with_contact` per set and reduction, and how many cases lie
-    inside CONTACT's patch and are combined.
+    """Return mean, 90 % quantile and maximum of the absolute errors of `compare_with_contact` per set and reduction.
+
+    Columns ``inside`` and ``combined`` count the cases with these properties.
     """
     rows = []
     for (name, reduction), part in comparison.groupby(["set", "reduction"], sort=False):
@@ -110,5 +113,5 @@ def summarise(comparison):
 
 
 def longitudinal_excess(comparison, share=0.02, slack=5e-6):
-    """Longitudinal error beyond 2 % of the position plus 0.005 mm; not above zero where the bar is met, m."""
+    """Return the longitudinal error beyond 2 % of the position plus 0.005 mm, m; zero or less meets the requirement."""
     return comparison.longitudinal_m.abs() - share * comparison.contact_x_m.abs() - slack

@@ -1,7 +1,7 @@
-"""Is every patch found, and none invented? The contact search against a dense one at random poses.
+"""Test of the contact search by comparison with a dense search at random positions: missed and false patches.
 
-The dense search looks at a strip every 0.02 mm and refines what comes close: nothing is skipped by a bound, so that it
-cannot share an error of the search's reserves. It costs some 100 us per wheel.
+The dense search evaluates a strip every 0.02 mm and refines small gaps. It skips no strip by a bound, so that it
+cannot share an error in the bounds of the contact search. It costs some 100 µs per wheel.
 """
 
 import math
@@ -26,17 +26,17 @@ DENSE_STEP = 2e-5
 """Distance of the dense search's strips, m."""
 
 SEPARATION = SCAN_STEP
-"""Overlaps closer to one another than this may count as one, m: the distance of the search's nodes."""
+"""Overlaps closer to one another than this may have a single patch, m; the distance of the search's nodes."""
 
 DEPTH = 1e-7
-"""Normal penetration from which an overlap must be found, m."""
+"""Minimum normal penetration of overlaps that the search must find, m."""
 
 POSE_RANGES = {"y": 0.012, "lift": 0.003, "roll": 0.010, "yaw": 0.030}
-"""Random poses lie within +- these, m and rad."""
+"""Random positions (m) and angles (rad) lie within ± these values."""
 
 _MAX_OVERLAPS = 32
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-_CLOSE = 2e-6  # a dip between two dense strips is shallower: M h^2/8 with M up to 1e4 1/m
+_CLOSE = 2e-6  # maximum depth of a minimum between two dense strips: M h^2/8 with M up to 1e4 1/m
 _LOW, _HIGH, _DEPTH, _GROUP = range(4)
 FOUND, MISSED, INVENTED, SPLIT, BAD = range(5)
 OUTCOMES = ("found", "missed", "invented", "split", "bad number")
@@ -44,7 +44,7 @@ OUTCOMES = ("found", "missed", "invented", "split", "bad number")
 
 @jit
 def _lowest(geometry, pose, low, high):
-    """Strip of the smallest gap between two strips (golden section), its gap, and the depth along the rail's normal."""
+    """Return the strip of the minimum gap between two strips, its gap, and its depth along the rail's normal, m."""
     a, b = low, high
     c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
     gap_c, gap_d = gap_at(geometry, pose, c)[0], gap_at(geometry, pose, d)[0]
@@ -64,7 +64,7 @@ def _lowest(geometry, pose, low, high):
 
 @jit
 def _note(overlaps, count, low, high, depth):
-    """Append an overlap if there is room; returns the new count."""
+    """Append an overlap if the array is not full; return the new count."""
     if count < overlaps.shape[0]:
         overlaps[count, _LOW], overlaps[count, _HIGH], overlaps[count, _DEPTH] = low, high, depth
         return count + 1
@@ -73,8 +73,10 @@ def _note(overlaps, count, low, high, depth):
 
 @jit
 def dense_overlaps(geometry, pose, overlaps):
-    """All overlaps of one wheel by a dense search: their number; fills ``overlaps`` (n, 4) from the flange to the field
-    side with first and last strip (m) and greatest depth along the rail's normal (m), the fourth column left alone.
+    """Find all overlaps of one wheel by a dense search; return their number.
+
+    Rows of ``overlaps`` (n, 4), from the flange to the field side, get first and last strip (m) and maximum depth along
+    the rail's normal (m); the fourth column is not changed.
     """
     strips = int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / DENSE_STEP) + 1
     count = 0
@@ -102,7 +104,7 @@ def dense_overlaps(geometry, pose, overlaps):
 
 @jit
 def _group(overlaps, count):
-    """Number the groups of overlaps that may count as one (closer than `SEPARATION`); returns how many there are."""
+    """Write the group index of each overlap; return the number of groups of overlaps closer than `SEPARATION`."""
     group = 0
     for j in range(count):
         if j > 0 and overlaps[j, _LOW] - overlaps[j - 1, _HIGH] >= SEPARATION:
@@ -113,7 +115,7 @@ def _group(overlaps, count):
 
 @jit
 def _in_group(overlaps, count, group, u):
-    """Whether a strip lies between the ends of a group of overlaps, to the dense search's spacing."""
+    """Whether a strip lies between the ends of a group of overlaps, within 1.5 steps of the dense search."""
     low, high = np.inf, -np.inf
     for j in range(count):
         if overlaps[j, _GROUP] == group:
@@ -123,7 +125,10 @@ def _in_group(overlaps, count, group, u):
 
 @jit
 def _sound(rows, count):
-    """Index of the first patch with a number that is not finite, without penetration, or upright; -1 if none is."""
+    """Return the index of the first invalid patch, or -1.
+
+    Invalid are numbers that are not finite, no penetration, or a contact angle of 90° or more.
+    """
     for i in range(count):
         fine = rows[i, PENETRATION] > 0.0 and abs(rows[i, ANGLE]) < 0.5 * math.pi
         for column in range(CURVATURE_Y + 1):
@@ -135,13 +140,15 @@ def _sound(rows, count):
 
 @jit
 def judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps):
-    """Compare the search with the dense one for one wheel: outcome, strip and depth (m) of the overlap or patch that it
-    is about, and the number of overlaps deeper than `DEPTH`; arguments as for
-    :func:`wrcore.contact.search.detection.find_patches`, ``axle`` pointing outwards, ``overlaps`` (n, 4) is scratch.
+    """Compare the contact search with the dense search for one wheel.
 
-    The outcome is FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the deepest count if
-    there are more than MAX_PATCHES), INVENTED (a patch outside all groups), SPLIT (more patches in a group than
-    overlaps) or BAD (a number that is not finite, no penetration, or an upright contact plane).
+    Arguments are those of :func:`wrcore.contact.search.detection.find_patches`; ``axle`` points outwards, ``overlaps``
+    (n, 4) is a work array. Returned are the outcome, strip and depth (m) of the failing overlap or patch, and the
+    number of overlaps deeper than `DEPTH`.
+
+    The outcome is FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the MAX_PATCHES
+    deepest overlaps are tested), INVENTED (a patch outside all groups), SPLIT (more patches in a group than overlaps)
+    or BAD (a number that is not finite, no penetration, or a contact angle of 90° or more).
     """
     count = find_patches(geometry, side, y, z, axle[0], axle[1], axle[2], spatial, reduction, rows)
     bad = _sound(rows, count)
@@ -183,7 +190,7 @@ def _judge_all(geometry, poses, depths, spatial, reduction, outcomes, details):
             cosine = side * math.cos(roll)
             axle = (-cosine * math.sin(yaw), cosine * math.cos(yaw), side * math.sin(roll))
             z = poses[i, 1]
-            if depths[i] > 0.0:  # lower this wheel until its deepest strip is this deep
+            if depths[i] > 0.0:  # lower this wheel to this depth of its deepest strip
                 z = _touching(geometry, side, y, z, axle, spatial) - depths[i]
             outcome, where, depth, expected = judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps)
             outcomes[i, wheel] = outcome
@@ -193,7 +200,7 @@ def _judge_all(geometry, poses, depths, spatial, reduction, outcomes, details):
 
 @jit
 def _touching(geometry, side, y, z, axle, spatial):
-    """Height at which the wheel just touches its rail, on strips 0.1 mm apart: a micrometre is enough here."""
+    """Return the height of first touch of the wheel, m, from strips 0.1 mm apart; an error of 1 µm is acceptable."""
     pose = make_pose(side, y, z, axle[0], axle[1], axle[2], spatial)
     lowest = 1.0
     for k in range(int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / 1e-4)):
@@ -203,7 +210,7 @@ def _touching(geometry, side, y, z, axle, spatial):
 
 @jit
 def _search_all(geometry, poses, spatial, reduction, counts):
-    """Patches of both wheels at all poses; ``counts`` (n, 2), -1 where a number is not finite or out of its range."""
+    """Fill ``counts`` (n, 2) with the number of patches of both wheels at all positions; -1 for an invalid patch."""
     rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     for i in range(poses.shape[0]):
         y, z, roll, yaw = poses[i]
@@ -217,16 +224,18 @@ def _search_all(geometry, poses, spatial, reduction, counts):
 
 
 def random_poses(count, seed=0, nominal=0.46, ranges=None):
-    """Random wheelset poses y, z (m), roll, yaw (rad), shape (count, 4), uniform in `POSE_RANGES` or other ranges; the
-    lift counts from a nominal height (m).
+    """Return random positions of a wheelset, y, z (m), roll, yaw (rad), shape (count, 4).
+
+    They are uniform in `POSE_RANGES` or other ranges; z is the nominal height (m) plus the lift.
     """
     half = [(POSE_RANGES | (ranges or {}))[name] for name in ("y", "lift", "roll", "yaw")]
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 4)) * half + [0.0, nominal, 0.0, 0.0]
 
 
 def count_patches(geometry, poses, detection="spatial", reduction="moment"):
-    """Number of patches per wheel, shape (n, 2), at poses (n, 4): y, z (m), roll, yaw (rad); -1 where a result is not
-    finite, has no penetration or stands upright.
+    """Return the number of patches per wheel, shape (n, 2), at positions (n, 4): y, z (m), roll, yaw (rad).
+
+    The number is -1 if a patch has numbers that are not finite, no penetration, or a contact angle of 90° or more.
     """
     counts = np.empty((len(poses), 2), np.int64)
     _search_all(geometry, poses, detection == "spatial", REDUCTIONS[reduction], counts)
@@ -234,9 +243,11 @@ def count_patches(geometry, poses, detection="spatial", reduction="moment"):
 
 
 def compare_with_dense(geometry, poses, detection="spatial", reduction="moment", depths=None):
-    """The search against the dense one at poses (n, 4), y, z (m), roll, yaw (rad), or with each wheel lowered by itself
-    to a penetration of ``depths`` (n,), m: a row per wheel with its pose, side, outcome (found, missed, invented,
-    split, bad number), u_wheel_m and depth_m of what is wrong, and overlaps (deeper than `DEPTH`).
+    """Compare the contact search with the dense search at positions (n, 4): y, z (m), roll, yaw (rad).
+
+    With ``depths`` (n,), m, each wheel is first lowered separately to this penetration. A row per wheel contains its
+    position, side, outcome (found, missed, invented, split, bad number), u_wheel_m and depth_m of the failing patch or
+    overlap, and the number of overlaps deeper than `DEPTH`.
     """
     import pandas as pd
 
@@ -253,9 +264,10 @@ def compare_with_dense(geometry, poses, detection="spatial", reduction="moment",
 
 
 def search_table(geometry, poses, dense, seed=0):
-    """The bar of the contact search: how often it fails at random poses, and how often it misses, invents or splits at
-    ``dense`` ones and as many wheels lowered to between `DEPTH` and 0.5 mm, where patches are small; a row per
-    detection and reduction.
+    """Count failures of the contact search at random positions, a row per detection and reduction.
+
+    Invalid patches are counted at ``poses`` positions. Missed, false and split patches are counted at ``dense``
+    positions, and at as many with wheels lowered to small penetrations between `DEPTH` and 0.5 mm.
     """
     import pandas as pd
 

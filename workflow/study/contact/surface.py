@@ -1,4 +1,4 @@
-"""Wheel of revolution and rail swept along the track: Eqs. (1)-(6) of Ferreira, Flores and Marques.
+"""Surfaces of a wheel (of revolution) and a rail (along the track), Eqs. (1)-(6) of Ferreira, Flores and Marques.
 
 These functions are the readable definition of the surfaces. They serve figures and tests; the contact search
 evaluates the same surfaces in compiled form (:mod:`wrcore.contact.search.detection`).
@@ -12,9 +12,11 @@ from wrcore.geometry.track import SIDES, rotation
 
 
 def wheel_surface(wheel, r0, half_distance, side, u, s):
-    """Points (..., 3) of a wheel's surface in the wheelset's frame, m, Eqs. (4)-(6), at lateral coordinates u (m) and
-    angles s (rad) that broadcast: ``s = 0`` is the lowest generator, s turns about the side's outward axle direction.
-    The profile's tape circle has the radius ``r0`` and the distance ``half_distance`` from the centre, m."""
+    """Return points (..., 3) of a wheel's surface in the wheelset's frame, m, Eqs. (4)-(6).
+
+    Lateral coordinates u (m) and angles s (rad) broadcast. ``s = 0`` is the lowest generator; s is positive about the
+    side's outward axle direction. The tape circle has the radius ``r0`` and the distance ``half_distance`` from the
+    centre, m."""
     u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
     f = wheel(u) - r0
     local = np.stack([f * np.sin(s), u, f * np.cos(s)], axis=-1)
@@ -23,18 +25,19 @@ def wheel_surface(wheel, r0, half_distance, side, u, s):
 
 
 def wheelset_transform(points, x=0.0, y=0.0, z=0.0, roll=0.0, yaw=0.0):
-    """Points of the wheelset's frame, shape (..., 3), moved to the track frame by a pose (m, rad)."""
+    """Transform points (..., 3) from the wheelset's frame to the track frame, by position (m) and attitude (rad)."""
     return np.asarray(points) @ rotation(roll, yaw).T + np.array([x, y, z])
 
 
 def rail_surface(rail, track, side, u, s):
-    """Points (..., 3) of a rail's surface in the track's absolute frame, m, Eqs. (1)-(3), at lateral coordinates u and
-    arc lengths s of the centre line (m) that broadcast.
+    """Return points (..., 3) of a rail's surface in the track's absolute frame, m, Eqs. (1)-(3).
+
+    Lateral coordinates u and arc lengths s of the centre line (m) broadcast.
 
     r_P = r_r(s) + A_r(s) {0, u, f(u)}, A_r = [t n b]. The rail's origin r_r lies in the track's cross-section at s, at
-    half the gauge plus its part of the widening, moved by the irregularity. The profile lies in that cross-section,
-    too, without turning: A_r is the frame of the track. Square to the rail's own line it would differ by the square of
-    the angle between both, 1e-5 of the profile's size in a steep cant ramp.
+    half the gauge plus its part of the widening, moved by the irregularity. The profile lies in that cross-section
+    without rotation: A_r is the frame of the track. A profile normal to the rail's line would differ by the square of
+    the angle between rail and track, 1e-5 of the profile's size in a steep cant ramp.
     """
     u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
     lateral, height = SIDES[side] * (track.rail_distance(rail) + u), rail(u)
@@ -46,7 +49,7 @@ def rail_surface(rail, track, side, u, s):
 
 
 def _along(track, s, side):
-    """Centre line (..., 3), frames (..., 3, 3), and a rail's lateral and vertical deviation (..., 2) at s."""
+    """Return centre line (..., 3), frames (..., 3, 3), and a rail's lateral and vertical deviation (..., 2) at s, m."""
     position, frames, deviation = np.empty((s.size, 3)), np.empty((s.size, 3, 3)), np.zeros((s.size, 2))
     first, values = (0 if side == "left" else 2), np.zeros((3, 4))
     for i, at in enumerate(s.flat):

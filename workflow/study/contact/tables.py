@@ -1,4 +1,4 @@
-"""Tables of the contact study: geometry of pairs, error of planar detection, reductions against CONTACT, patches.
+"""Tables of the contact study: geometry of pairs, error of planar detection, continuity of reductions, patches.
 
 All tables are pandas frames in SI units; a column carries its unit.
 """
@@ -37,12 +37,13 @@ _DESCENT = 2e-5  # m
 
 
 TOUCH = 1e-3
-"""Wheel load at which a wheelset counts as just touching, N: penetration below 1 nm."""
+"""Wheel load that defines first touch, N; the penetration is below 1 nm."""
 
 
 def study_pair(settings):
-    """A wheelset on its track from one entry of the study's pairs: names of wheel and rail, inclination (ratio), gauge,
-    rolling_radius, half_distance (m).
+    """Return a wheelset on its track from one entry of the study's pairs.
+
+    The entry contains names of wheel and rail, inclination (ratio), gauge, rolling_radius and half_distance (m).
     """
     wheel = named_profile(settings["wheel"], "wheel")
     rail = named_profile(settings["rail"], "rail", settings["inclination"])
@@ -51,15 +52,16 @@ def study_pair(settings):
 
 
 def touch_table(pairs, shifts):
-    """Rigid first touch of several pairs at lateral shifts (n,), m, without yaw: ``pair`` and the columns of
-    :func:`wrcore.contact.rigid.first_touch.first_touch` (with roll).
+    """Return the rigid first touch of several pairs at lateral shifts (n,), m, with roll, without yaw.
+
+    Columns: ``pair`` and the columns of :func:`wrcore.contact.rigid.first_touch.first_touch`.
     """
     tables = {label: first_touch(pair, shifts) for label, pair in pairs.items()}
     return pd.concat(tables, names=["pair"]).reset_index(level="pair").reset_index(drop=True)
 
 
 def conicity_table(pairs, amplitudes):
-    """Equivalent conicity of several pairs over amplitudes (n,), m, with roll and, as EN 15302 has it, without."""
+    """Return equivalent conicity of several pairs over amplitudes (n,), m, with roll and without (EN 15302)."""
     rows = []
     for label, pair in pairs.items():
         curves = [conicity_curve(pair, amplitudes, roll).equivalent_conicity for roll in (True, False)]
@@ -69,8 +71,10 @@ def conicity_table(pairs, amplitudes):
 
 
 def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
-    """Where a wheelset touches without load, with roll, at all combinations of lateral shifts (m) and yaw angles (rad):
-    roll, and of each wheel's most loaded patch position, contact angle and rolling radius.
+    """Return contact positions of an unloaded wheelset at all combinations of lateral shifts (m) and yaw angles (rad).
+
+    The wheelset rolls until both wheels touch. Columns: roll, and position, contact angle and rolling radius at each
+    wheel's most loaded patch.
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(yaws, shifts, indexing="ij"))
     poses = pd.DataFrame({"pose_id": np.arange(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
@@ -87,17 +91,18 @@ def _radius(geometry, u):
 
 
 def first_order_law(yaw, angle, radius=0.46):
-    """Normal penetration that planar detection misses, to first order: r psi^2 tan^2(delta) cos(delta)/2, m, from yaw
-    psi and contact angle delta (rad) and rolling radius r (m).
+    """Return the first-order error of planar detection in the normal penetration, m.
+
+    It is r psi^2 tan^2(delta) cos(delta)/2 with yaw psi, contact angle delta (rad) and rolling radius r (m).
     """
     return 0.5 * radius * np.square(yaw) * np.square(np.tan(angle)) * np.cos(angle)
 
 
 @jit
 def _descend(geometry, pose, u):
-    """Local minimum of the gap downhill from strip ``u``: walk, then golden section to 1e-9 m."""
+    """Return the strip of the local minimum of the gap near strip ``u``: fixed steps, then golden section to 1e-9 m."""
     here = gap_at(geometry, pose, u)[0]
-    while here > 0.5 and u < 0.0:  # beside the rail's gauge face: start at the face
+    while here > 0.5 and u < 0.0:  # outside the rail profile at the gauge face: start at the face
         u += _DESCENT
         here = gap_at(geometry, pose, u)[0]
     step = _DESCENT if gap_at(geometry, pose, u + _DESCENT)[0] < here else -_DESCENT
@@ -118,7 +123,7 @@ def _descend(geometry, pose, u):
 
 @jit
 def _planar_errors(geometry, hertz, modulus, load, shifts, yaws, out):
-    """Rows of `planar_error_map`; left wheel, no roll."""
+    """Fill ``out`` with rows of `planar_error_map` for the left wheel without roll."""
     rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     i = 0
     for yaw in yaws:
@@ -150,15 +155,15 @@ def _planar_errors(geometry, hertz, modulus, load, shifts, yaws, out):
 
 
 def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
-    """What planar detection misses at the most loaded spatial patch of a left wheel, over lateral shifts to the left
-    (m) and yaw (rad), without roll, at the height at which it carries a vertical load (N) with spatial detection and
-    the reduction ``maximum``.
+    """Return errors of planar detection at the most loaded patch of a left wheel, over lateral shift and yaw.
+
+    Shifts are positive to the left (m), yaw is in rad, roll is zero. At its height the wheel carries a vertical load
+    (N) with spatial detection and the reduction ``maximum``.
 
     Columns: u_spatial_m, u_planar_m (deepest strips), spatial_m, planar_m (penetration along the normal, negative where
-    planar detection sees no contact), missed_m (lower overlap along the common normal), shift_m (missed longitudinal
-    position), bound_m (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law). Errors are NaN
-    where planar detection's lowest strip is further than ``same_patch`` (m) from the spatial one: it belongs to another
-    patch.
+    planar detection finds no contact), missed_m (spatial less planar overlap along the normal), shift_m (error of the
+    longitudinal position), bound_m (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law).
+    Errors are NaN where the deepest strips are further apart than ``same_patch`` (m) and belong to different patches.
     """
     modulus = contact_modulus(**MATERIAL)
     out = np.empty((len(shifts) * len(yaws), 12))
@@ -174,8 +179,9 @@ def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
 
 
 def over_contact_angle(table, edges, column):
-    """Median of a column of `planar_error_map` per class of contact angle (``edges`` (n + 1,), rad) and yaw, shape
-    (n, yaws); NaN where no pose has such an angle: this pair's contact jumps over it.
+    """Return the median of a column of `planar_error_map` per class of contact angle and yaw, shape (n, yaws).
+
+    Classes have the ``edges`` (n + 1,), rad. The median is NaN where contact of this pair never has such an angle.
     """
     classes = pd.cut(table.contact_angle_rad, edges, labels=range(len(edges) - 1))
     median = table.groupby([classes, "yaw_rad"], observed=False)[column].median()
@@ -195,8 +201,10 @@ def _sweep(geometry, hertz, modulus, y, z, spatial, reduction, force):
 
 
 def lateral_sweep(geometry, reach, step, load, detection="spatial"):
-    """Vertical force (N) of both wheels of the centred pair per reduction (``maximum_N``, ``moment_N``) over y_m from
-    -reach to reach (m), without roll and yaw, at the height at which each wheel carries a vertical load (N) at y = 0.
+    """Return the vertical force of both wheels (N) over the lateral position, per reduction, at constant height.
+
+    Each wheel carries the vertical load (N) at y = 0; roll and yaw are zero. Columns: y_m from -reach to reach (m),
+    ``maximum_N`` and ``moment_N``.
     """
     hertz, modulus, spatial = hertz_table(), contact_modulus(**MATERIAL), detection == "spatial"
     count = round(reach / step)
@@ -210,9 +218,10 @@ def lateral_sweep(geometry, reach, step, load, detection="spatial"):
 
 
 def sweep_jumps(sweep, reaches):
-    """How continuous the force of `lateral_sweep` is in each part -reach..reach (m): largest_step_N between
-    neighbouring positions and where (at_m), smooth_step_N (99th percentile of the steps: the smooth slope), their
-    ratio.
+    """Return measures of the continuity of the force of `lateral_sweep` in each range -reach..reach (m).
+
+    Columns: largest_step_N between neighbouring positions, its position at_m, smooth_step_N (99th percentile of the
+    steps, from the smooth slope), and the ratio of both steps.
     """
     rows = []
     for reach in reaches:
@@ -237,9 +246,10 @@ def _force_over_depth(geometry, hertz, modulus, y, yaw, heights, reduction, out)
 
 
 def force_over_height(geometry, y, yaw, lowering, reduction="moment"):
-    """Patches of the left wheel, without roll, while it is lowered from where it just touches (``lowering`` (n,), m):
-    where they appear, how they share the force, where they merge; lowering_m, patches, vertical_N and, per patch from
-    the flange to the field side, u_wheel_m and N_N (NaN where there is none).
+    """Return contact patches of the left wheel, without roll, at heights below first touch (``lowering`` (n,), m).
+
+    Columns: lowering_m, patches (their number), vertical_N, and position u_wheel_m and normal force N_N of each patch,
+    from the flange to the field side (NaN for patches that do not exist).
     """
     hertz, modulus = hertz_table(), contact_modulus(**MATERIAL)
     rows, nominal = np.empty((MAX_PATCHES, PATCH_COLUMNS)), geometry.rolling_radius
