@@ -1,4 +1,4 @@
-"""How cost grows with wheelsets, duration, tolerance and simultaneous scenes."""
+"""Time evaluations and runs over number of wheelsets, duration, tolerance and simultaneous scenes."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The benchmarks, and the machine they ran on."""
+"""Run the benchmarks and record the machine."""
 
 import sys
 

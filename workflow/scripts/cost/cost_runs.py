@@ -1,4 +1,4 @@
-"""What a batch of runs spends outside the integration, and how many steps are rejected."""
+"""Measure the time of a batch of runs outside the integration, and the share of rejected steps."""
 
 import sys
 

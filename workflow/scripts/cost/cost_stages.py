@@ -1,4 +1,4 @@
-"""Time, operations and bytes of one right-hand side by stage, and what the machine could do at best."""
+"""Measure time, operations and bytes of one evaluation by stage, and the limits of the machine."""
 
 import sys
 

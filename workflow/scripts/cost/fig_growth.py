@@ -1,4 +1,4 @@
-"""Cost over wheelsets, duration, tolerance and simultaneous scenes."""
+"""Plot computing time over number of wheelsets, duration, tolerance and simultaneous scenes."""
 
 import sys
 

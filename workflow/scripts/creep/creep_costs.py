@@ -1,8 +1,8 @@
-"""Time all creep laws, tables and levels in turn, with nothing beside them."""
+"""Time all creep laws, tables and levels of the exact solver in turn, without other jobs on the machine."""
 
 import os
 
-os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the job holds all cores but computes on one; read when scipy is loaded
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the job reserves all cores, computes on one; set before scipy loads
 
 import sys  # noqa: E402
 from pathlib import Path  # noqa: E402

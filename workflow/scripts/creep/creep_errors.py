@@ -1,4 +1,4 @@
-"""Errors of all creep laws, tables and levels in CONTACT's cases."""
+"""Compute errors of all creep laws, tables and levels of the exact solver in CONTACT's cases."""
 
 import sys
 from pathlib import Path

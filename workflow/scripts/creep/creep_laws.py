@@ -1,4 +1,4 @@
-"""Error and cost of all creep laws in one table."""
+"""Combine errors and computing time of all creep laws in one table."""
 
 import sys
 from pathlib import Path

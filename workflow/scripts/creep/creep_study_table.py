@@ -1,4 +1,4 @@
-"""Build one of the study's creep tables and note what that costs."""
+"""Build one creep table of the study and record its computing time."""
 
 import sys
 from functools import partial

@@ -1,4 +1,4 @@
-"""Build the creep table that every run reads."""
+"""Build the default creep table of the study's runs."""
 
 import sys
 from functools import partial

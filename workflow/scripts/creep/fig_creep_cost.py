@@ -1,4 +1,4 @@
-"""Cost against error of all creep laws, with CONTACT's own points."""
+"""Plot computing time over error of all creep laws and of CONTACT."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Creep curves of every law against the exact solution."""
+"""Plot creep curves of all laws and of the exact solution."""
 
 import sys
 

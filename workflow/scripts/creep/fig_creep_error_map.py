@@ -1,4 +1,4 @@
-"""Where a creep table errs."""
+"""Compute and plot errors of a creep table over its range."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""How smooth a creep table is across its cells, its pole and zero creepage."""
+"""Compute and plot the smoothness of a creep table across its cells, at its pole and at zero creepage."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Traction, stick and slip areas of some cases."""
+"""Plot traction, stick and slip areas of some cases of rolling contact."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Root loci and limit cycles of the vehicles as figures, and their critical speeds as a table."""
+"""Plot root loci and limit cycles of the vehicles and tabulate their critical speeds."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Modes of one vehicle at one speed."""
+"""Plot the modes of one vehicle at one speed."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Limit cycles of one vehicle over speed, from a large disturbance downwards and from a small one upwards."""
+"""Compute limit cycles of one vehicle at falling speed (large disturbance) and at rising speed (small disturbance)."""
 
 import sys
 
@@ -14,6 +14,6 @@ changes = [*overrides, "initial.y=0.0", f"contact.detection={snakemake.wildcards
 settling = Settling(**settings.pop("settling"))
 cycles = limit_cycles(load_scene(source, changes), params.speeds, settling, **settings)
 if cycles.attrs.get("stopped"):
-    raise KeyboardInterrupt  # a part of the table is no result of the job
+    raise KeyboardInterrupt  # the job must not save an incomplete table
 cycles.insert(0, "detection", snakemake.wildcards.detection)
 cycles.to_csv(snakemake.output[0], index=False)

@@ -1,4 +1,4 @@
-"""Modes of one vehicle over speed, its modes at one speed in full, and what its linear critical speed depends on."""
+"""Compute modes of one vehicle over speed, its modes at one speed, and linear critical speeds of its variants."""
 
 import sys
 

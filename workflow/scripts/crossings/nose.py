@@ -1,4 +1,4 @@
-"""A wheel over the nose of a crossing by every patch model: tables and figure."""
+"""Compute and plot the contact of a wheel on the nose of a crossing for all patch models."""
 
 import sys
 

@@ -1,1 +1,1 @@
-"""What things cost: timed in turn in one process, stage by stage, over size, and against the machine's limits."""
+"""Computing time of evaluations and runs: comparisons, stages, growth with size, and limits of the machine."""

@@ -1,4 +1,4 @@
-"""Cost of joints alone: chains of bars of growing length, without contact and force elements."""
+"""Time of joints: chains of an increasing number of bars, without contact and force elements."""
 
 import numpy as np
 import pandas as pd
@@ -15,8 +15,9 @@ STATES = 16
 
 
 def chain(base, n, kind):
-    """Bars, joined by spherical or revolute joints, that hang one below the other from the moving frame of a base
-    model: `Recorded` states near the hanging position, rotations and velocities at random.
+    """Return a chain of ``n`` bars with spherical or revolute joints, hanging from the moving frame of a base model.
+
+    The states of the `Recorded` model are near the hanging position, with random rotations and velocities.
     """
     spins = np.zeros(n, np.int64)
     bodies = Bodies(np.ones(n), np.full((n, 3), 0.1), spins, np.zeros(0, np.int64))
@@ -37,7 +38,7 @@ def chain(base, n, kind):
 
 
 def over_chains(base, lengths, passes):
-    """Time of a right-hand side (ns, median and quartiles, and per bar) over the bars of a chain, by joint."""
+    """Time the right-hand side (ns, median and quartiles, and per bar) over the number of bars, by kind of joint."""
     kinds = [(kind, n) for kind in ("spherical", "revolute") for n in lengths]
     found = [chain(base, n, kind) for kind, n in kinds]
     seconds = take_turns([evaluation("", each) for each in found], passes)

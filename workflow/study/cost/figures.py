@@ -1,4 +1,4 @@
-"""Figures of cost: how it grows, and which stages of an evaluation it goes to.
+"""Figures of computing time: growth with size, and time of an evaluation by stage.
 
 They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 """
@@ -13,12 +13,12 @@ SERIES = (
     {"color": "#E69F00", "marker": "s", "linestyle": (0, (4, 2))},
     {"color": "#000000", "marker": "^", "linestyle": "-."},
 )
-"""Okabe-Ito colours; marker and line tell series apart in grey too."""
+"""Okabe-Ito colours; marker and line style distinguish series in greyscale."""
 
 
 @styled
 def fig_growth(wheelsets, runs, scenes):
-    """Cost over the number of wheelsets, duration, tolerance and simultaneous scenes (`study.cost.growth`)."""
+    """Plot time over number of wheelsets, duration, tolerance and number of scenes (`study.cost.growth`)."""
     figure = Figure(figsize=(7.2, 6.0), layout="constrained")
     (a, b), (c, d) = figure.subplots(2, 2)
     for (scene, part), style in zip(wheelsets.groupby("scene", sort=False), SERIES, strict=False):
@@ -54,7 +54,7 @@ def fig_growth(wheelsets, runs, scenes):
 
 
 def _spread(table, column):
-    """Distances (2, n) of the quartiles from the median, for error bars."""
+    """Return distances (2, n) of the quartiles from the median, for error bars."""
     return [table[column] - table[f"{column}_low"], table[f"{column}_high"] - table[column]]
 
 
@@ -62,12 +62,12 @@ STAGE_COLOURS = {
     "bodies": "#000000", "suspension": "#0072B2", "joints": "#56B4E9", "search": "#D55E00", "patch": "#E69F00",
     "Hertz": "#F0E442", "creep": "#009E73", "rest": "0.8",
 }  # fmt: skip
-"""Okabe-Ito colours; numbers on the bars tell stages apart in grey too."""
+"""Okabe-Ito colours; numbers on the bars distinguish stages in greyscale."""
 
 
 @styled
 def fig_breakdown(table):
-    """Time of one right-hand side by stage (`with_limits`), beside the least that the machine could take for it."""
+    """Plot the time of one evaluation by stage with the minimum time on this machine (`with_limits`)."""
     scenes = list(dict.fromkeys(table["scene"]))
     figure = Figure(figsize=(7.2, 0.7 + 2.1 * len(scenes)), layout="constrained")
     for axes, scene in zip(figure.subplots(len(scenes), 1, squeeze=False)[:, 0], scenes, strict=True):
@@ -87,5 +87,5 @@ def fig_breakdown(table):
 
 
 def _sides(bars):
-    """Left and right ends of bars."""
+    """Return left and right ends of bars."""
     return [bar.get_x() for bar in bars], [bar.get_x() + bar.get_width() for bar in bars]

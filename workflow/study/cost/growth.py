@@ -1,4 +1,4 @@
-"""How cost grows: with wheelsets, duration, tolerance, and scenes at the same time."""
+"""Computing time over number of wheelsets, duration, tolerance, and number of simultaneous scenes."""
 
 import time
 from pathlib import Path
@@ -15,15 +15,15 @@ from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
 
 BEYOND_ARITHMETIC = 1.25
-"""Time per evaluation and wheelset, over its least value, from which on something else than arithmetic is paid for."""
+"""Time per evaluation and wheelset over its minimum above which arithmetic alone does not explain the time."""
 
 
 def array_bytes(part):
-    """Bytes of all arrays in a tuple of arrays, tuples and numbers; an array that occurs twice counts once."""
+    """Return the bytes of all arrays in a tuple of arrays, tuples and numbers; each array is counted once."""
     found = {}
 
     def collect(item):
-        """Note the arrays in a part."""
+        """Add the arrays in an item to ``found``."""
         if isinstance(item, np.ndarray):
             found[item.__array_interface__["data"][0]] = item.nbytes
         elif isinstance(item, tuple):
@@ -35,7 +35,7 @@ def array_bytes(part):
 
 
 def cache_sizes():
-    """Sizes of the first core's data caches, bytes, by name (L1, L2, L3); empty where the system does not say."""
+    """Return sizes of the first core's data caches, bytes, by name (L1, L2, L3); empty if they are unknown."""
     sizes = {}
     for folder in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
         if (folder / "type").read_text().strip() != "Instruction":
@@ -45,12 +45,13 @@ def cache_sizes():
 
 
 def over_wheelsets(title, source, overrides, *, spacing, counts, duration, states, passes):
-    """Time of a right-hand side, at states of a run, and of runs of a duration (s) over the length of a train:
-    ``counts`` vehicles, ``spacing`` (m) apart, of a scene of one vehicle on tangent, perfect track.
+    """Time evaluations of the right-hand side and runs of trains of ``counts`` vehicles, ``spacing`` (m) apart.
 
-    A row per train: bodies, wheelsets; microseconds per evaluation of the right-hand side and, in a run, per evaluation
-    with all that the integration adds, each with quartiles and per wheelset; real-time factor; bytes of what belongs to
-    each wheelset or body (``own_bytes``) and of what all share (``shared_bytes``).
+    The vehicle is that of a scene on tangent track without irregularity; runs have a duration (s).
+
+    A row per train contains bodies and wheelsets; microseconds per evaluation of the right-hand side, alone and in a
+    run with the work of the integrator, each with quartiles and per wheelset; real-time factor; bytes of data that
+    belong to individual wheelsets or bodies (``own_bytes``) and of shared data (``shared_bytes``).
     """
     recorded, runs, rows = [], [], []
     for count in counts:
@@ -81,15 +82,17 @@ def _run(model, start, settings, times):
 
 
 def _bytes(model, trajectory):
-    """What all wheelsets share in an evaluation, and what bodies and wheelsets have of their own in a run."""
+    """Return bytes of data shared by all wheelsets, and of data that belong to individual bodies and wheelsets."""
     shared = array_bytes(model.contact)
     own = array_bytes((model, workspace(model), trajectory.end.memory)) - shared
     return {"own_bytes": own, "shared_bytes": shared}
 
 
 def over_runs(title, source, overrides, *, durations, tolerances, passes):
-    """Time of runs over their duration (s), and over their relative tolerance (absolute: a thousandth): what is varied
-    and its value, evaluations, steps, rejected steps, milliseconds, microseconds per evaluation, real-time factor.
+    """Time runs over their duration (s) and over their relative tolerance (absolute tolerance: a thousandth of it).
+
+    Columns: name and value of the varied quantity, evaluations, steps, rejected steps, milliseconds, microseconds per
+    evaluation, real-time factor.
     """
     scene = load_scene(source, overrides)
     model, start = compile_scene(scene)
@@ -113,12 +116,11 @@ def over_runs(title, source, overrides, *, durations, tolerances, passes):
 
 
 def over_scenes(title, source, overrides, *, counts, threads, passes):
-    """Time of several scenes, which differ in speed, in one process, one after the other and at the same time, a row
-    per number of scenes and threads.
+    """Time several scenes of different speed in one process, a row per number of scenes and number of threads.
 
-    Columns: milliseconds by the wall per scene with quartiles, how many times faster than one at a time, how many
-    processors the runs got on average (with other work on the machine less than there are), and whether all results
-    were those of single runs to the bit.
+    Columns: wall time per scene (ms) with quartiles, speed-up relative to the first number of threads, mean number of
+    processors used (reduced by other work on the machine), and whether all results are bitwise identical to those of
+    single runs.
     """
     scenes = [load_scene(source, [*overrides, f"speed={speed:g}"]) for speed in np.linspace(30.0, 55.0, max(counts))]
     alone = [simulate_many([scene], progress=False)[0] for scene in scenes]
@@ -127,7 +129,7 @@ def over_scenes(title, source, overrides, *, counts, threads, passes):
         results, spent = {}, {at_once: [] for at_once in threads}
 
         def together(at_once, count=count, results=results, spent=spent):
-            """Run the scenes, so many at once, and note what they gave and took."""
+            """Run the scenes with ``at_once`` threads; record their results and their processor and wall time."""
             began = time.process_time(), time.perf_counter()
             results[at_once] = simulate_many(scenes[:count], progress=False, threads=at_once)
             spent[at_once].append((time.process_time() - began[0], time.perf_counter() - began[1]))
@@ -145,7 +147,7 @@ def over_scenes(title, source, overrides, *, counts, threads, passes):
 
 
 def identical(run, other):
-    """Whether two runs have the same status and the same numbers, to the bit, in all channels."""
+    """Whether two runs have the same status and equal numbers in all channels, bit by bit."""
     if run.status != other.status or run.groups.keys() != other.groups.keys():
         return False
     pairs = [(run.groups[g][c], other.groups[g][c]) for g in run.groups for c in run.groups[g]]
@@ -153,10 +155,11 @@ def identical(run, other):
 
 
 def findings(wheelsets, caches):
-    """From which train on time per evaluation is more than arithmetic, in words, a row per scene of
-    :func:`over_wheelsets`: range of time per evaluation and wheelset (us), the smallest train above
-    ``BEYOND_ARITHMETIC`` times the least, bytes of the longest train with what it shares, and the smallest of the
-    caches (:func:`cache_sizes`) that holds them.
+    """Return the size of a train above which arithmetic alone does not explain the time, a row per scene.
+
+    Columns, from :func:`over_wheelsets`: minimum and maximum time per evaluation and wheelset (µs), wheelsets of the
+    smallest train above ``BEYOND_ARITHMETIC`` times the minimum, bytes of the longest train with its shared data, and
+    the smallest cache (:func:`cache_sizes`) that is large enough for them.
     """
     rows = []
     for scene, part in wheelsets.groupby("scene", sort=False):

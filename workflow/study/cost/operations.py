@@ -1,7 +1,7 @@
-"""Operations and bytes of one right-hand side, counted: the kernels' own source is run by Python on numbers that count.
+"""Count of operations and bytes of one evaluation: Python runs the source of the kernels on counting numbers.
 
-Compiled kernels are replaced by the functions they were made from for as long as the count lasts, and the vector
-registers of :mod:`wrcore.kernels.lanes` by arrays of eight numbers.
+During the count, the Python functions replace their compiled kernels, and arrays of eight numbers replace the vector
+registers of :mod:`wrcore.kernels.lanes`.
 """
 
 import math
@@ -19,7 +19,7 @@ from wrcore.forces.law import LAW, LAWS
 from wrcore.wheels import hertzian_force as wheel
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
-"""In the order in which they are added up."""
+"""Stages of an evaluation, in the order in which they are added up."""
 
 QUANTITIES = ("flops", "divisions", "roots", "functions", "bytes")
 
@@ -36,11 +36,11 @@ WHERE = {
     ("wrcore.wheels.hertzian_force", "normal_ellipse"): "Hertz",
     ("wrcore.wheels.hertzian_force", "creep_force_at"): "creep",
 }
-"""Stage that begins with a function, by the module that calls it and its name there; all else belongs to the caller."""
+"""Stage of a function, by the calling module and the name there; other functions belong to the stage of the caller."""
 
 
 class Tally:
-    """Counts by stage and quantity, and the stages under way."""
+    """Counts by stage and quantity, and the stack of active stages."""
 
     def __init__(self):
         self.counts, self.stages = Counter(), ["bodies"]
@@ -49,10 +49,10 @@ class Tally:
         self.counts[self.stages[-1], quantity] += number
 
     def within(self, stage, function):
-        """The function, with its operations counted for a stage."""
+        """Return the function with its operations counted for a stage."""
 
         def counted(*arguments):
-            """The function, within the stage."""
+            """Call the function within the stage."""
             self.stages.append(stage)
             try:
                 return function(*arguments)
@@ -66,8 +66,8 @@ def _binary(name, quantity):
     operation = getattr(np.float64, name)
 
     def apply(self, other):
-        """The operation on a number and another one, counted."""
-        if isinstance(other, np.ndarray):  # lane by lane, from the array's side
+        """Apply the operation to two numbers and count it."""
+        if isinstance(other, np.ndarray):  # NumPy then calls the operation for each element
             return NotImplemented
         self.tally.add(quantity)
         return Number(operation(self.value, np.float64(getattr(other, "value", other))), self.tally)
@@ -76,7 +76,7 @@ def _binary(name, quantity):
 
 
 class Number:
-    """A float64 that counts what is done with it."""
+    """A float64 that counts the operations on it."""
 
     __slots__ = ("value", "tally")
 
@@ -144,7 +144,7 @@ class Number:
 
 
 class Numbers(np.ndarray):
-    """An array of numbers that count; reading or writing one of them counts its bytes."""
+    """An array of counting numbers (`Number`) that also counts the bytes of elements read or written."""
 
     def __array_finalize__(self, other):
         self.tally, self.size_of_one = getattr(other, "tally", None), getattr(other, "size_of_one", 8)
@@ -163,7 +163,7 @@ class Numbers(np.ndarray):
 
 
 def counting(part, tally):
-    """A tuple of arrays, tuples and numbers with all its floating-point numbers counting."""
+    """Return a tuple of arrays, tuples and numbers with each floating-point number replaced by a `Number`."""
     if isinstance(part, tuple):
         return type(part)(*(counting(item, tally) for item in part))
     if isinstance(part, np.ndarray) and part.dtype.kind == "f":
@@ -176,14 +176,14 @@ def counting(part, tally):
 
 
 def _mathematics(tally):
-    """Stands in for ``math``: functions of numbers that count."""
+    """Return a replacement for the module ``math`` with functions that are counted."""
 
     def counted(name):
-        """The function of that name for numbers that count and for others."""
+        """Return the function of this name for counting and for plain numbers."""
         plain, quantity = getattr(math, name), "roots" if name == "sqrt" else "functions"
 
         def function(x, *more):
-            """Its value, counted."""
+            """Return the value of the function and count the call."""
             if not isinstance(x, Number):
                 return plain(x, *map(float, more))
             tally.add(quantity)
@@ -199,7 +199,7 @@ def _mathematics(tally):
 
 
 def _registers(tally):
-    """Stand-ins for :mod:`wrcore.kernels.lanes`, by name: lanes are arrays of numbers that count one by one."""
+    """Return replacements for functions of :mod:`wrcore.kernels.lanes` by name; lanes are arrays of `Number`."""
 
     def load(rows, start, count):
         tally.add("bytes", rows.size_of_one * count)
@@ -232,19 +232,19 @@ def _registers(tally):
 
 
 def _call(_, *arguments):
-    """Stands for calls of kernels by address: that of the joints has four arguments, of wheels on ellipses eight."""
+    """Replace calls of kernels by address: joints have four arguments, wheels with elliptic patches eight."""
     kernel = constraints.add_reactions if len(arguments) == 4 else wheel.wheel_wrenches
     kernel(*arguments)
 
 
 def _by_law(elements, k, *motion):
-    """Stands for calls of elements' laws by address."""
+    """Replace calls of the laws of force elements by address."""
     return LAWS[int(elements.law[k, LAW])].py_func(elements, k, *motion)
 
 
 @contextmanager
 def interpreted(tally):
-    """Kernels run by Python, their stages told apart, until the block ends."""
+    """Replace compiled kernels by Python functions, counted by stage, within a ``with`` block."""
     registers, mathematics, before = _registers(tally), _mathematics(tally), []
     modules = [
         m for name, m in sys.modules.items() if name.startswith("wrcore.") and not name.startswith("wrcore.cost")
@@ -282,9 +282,10 @@ def interpreted(tally):
 
 
 def count_operations(recorded, states=20):
-    """Operations and bytes of one right-hand side by stage and as a ``whole``, on average over some states of the run:
-    floating-point sums and products (a fused one counts two), divisions, square roots, other functions, and bytes of
-    floating-point numbers read from and written to arrays.
+    """Return mean counts of operations and bytes of one evaluation over states of the run, by stage and as ``whole``.
+
+    They are floating-point sums and products (two for a fused multiply-add), divisions, square roots, other functions,
+    and bytes of floating-point numbers that are read from and written to arrays.
     """
     chosen = recorded.states[:: max(1, len(recorded.states) // states)]
     tally = Tally()

@@ -1,7 +1,7 @@
-"""The benchmarks: what is faster than what, and by how much.
+"""Benchmarks: comparisons of the computing time of two or more variants.
 
-Every group of contenders takes turns in one process; compiling and loading kernels is left out (but where it is the
-point, as in ``process``). All functions return rows of :func:`study.cost.timing.compare`.
+All variants of a group run in turn in one process. Times exclude compiling and loading of kernels, except in
+``process``. All benchmark functions return rows of :func:`study.cost.timing.compare`.
 """
 
 import json
@@ -30,21 +30,21 @@ BOXES = {"in the wheelsets": "false", "bodies on joints": "true"}
 """Settings of ``vehicle.axle_boxes``."""
 
 AIM = 0.005
-"""Processor time that a timed call lasts at least, roughly, s."""
+"""Approximate minimum processor time of a timed call, s."""
 
 
 def lateral(trajectory, model):
-    """Lateral positions of the wheelsets over time, m, shape (n, k)."""
+    """Return lateral positions of the wheelsets over time, m, shape (n, k)."""
     return trajectory.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
 
 
 def rms(values):
-    """Root mean square."""
+    """Return the root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def repeats(call):
-    """How often a call must be made to last ``AIM``."""
+    """Return the number of repetitions of a call that take about ``AIM``."""
     call()
     started = time.process_time()
     call()
@@ -52,7 +52,7 @@ def repeats(call):
 
 
 def repeated(label, call, units=1.0):
-    """Contender that makes a short call so often that it can be timed."""
+    """Return a `Contender` that repeats a short call until it takes about ``AIM``."""
     count = repeats(call)
 
     def often():
@@ -63,11 +63,11 @@ def repeated(label, call, units=1.0):
 
 
 def engine_against_scipy(title, scene, accuracy, ladder, passes):
-    """Dormand and Prince's pair, compiled and by scipy, over the same compiled right-hand side, at equal ``accuracy``:
-    rms error of the lateral position (m) against a run at a tolerance of 1e-11 by another method.
+    """Compare the Dormand-Prince pair, compiled and in SciPy, at equal accuracy on the same compiled right-hand side.
 
-    Its time is interpolated between runs at a ladder of relative tolerances (error and time logarithmic; the loosest
-    run where even that is more accurate).
+    ``accuracy`` is the RMS error of the lateral position (m) relative to a run of ``tsit5`` at a tolerance of 1e-11.
+    The time at this error is interpolated (logarithmically) between runs at the relative tolerances of ``ladder``. If
+    the run at the loosest tolerance is more accurate, its time is used.
     """
     model, start = compile_scene(scene)
     times = output_times(0.0, scene.data["integration"]["duration"], 200.0)
@@ -89,15 +89,16 @@ def engine_against_scipy(title, scene, accuracy, ladder, passes):
 
 
 def time_at_error(accuracy, errors, seconds):
-    """Times (passes,) at an error, from errors (n,) and times (passes, n) of runs; NaN if none is so accurate."""
+    """Interpolate times (passes,) at an error, from errors (n,) and times (passes, n); NaN if no run reaches it."""
     order = np.argsort(errors)
     errors, seconds = np.log(errors[order]), np.log(seconds[:, order])
     return np.exp([np.interp(np.log(accuracy), errors, row, left=np.nan) for row in seconds])
 
 
 def compiled_against_plain(scene, states, duration, passes):
-    """The compiled right-hand side against the plain NumPy one, for one wheelset on tangent track: per evaluation at
-    states of the scene's run, and in runs of a duration (s) by the same pair.
+    """Compare the compiled right-hand side with a plain NumPy version, for one wheelset on tangent track.
+
+    Times are per evaluation at ``states`` of the scene's run, and of runs of a duration (s) by the same method.
     """
     recorded = record(scene, scene.data["integration"]["duration"], states)
     model, start = recorded.model, compile_scene(scene)[1]
@@ -119,7 +120,7 @@ def compiled_against_plain(scene, states, duration, passes):
 
 
 def planar_against_spatial(title, scene, passes):
-    """Whole runs with planar and with spatial detection."""
+    """Compare the time of whole runs with planar and with spatial detection."""
     model, start = compile_scene(scene)
     settings = scene.data["integration"]
     times = output_times(0.0, settings["duration"], scene.data["output"]["rate"])
@@ -133,7 +134,7 @@ def planar_against_spatial(title, scene, passes):
 
 
 def right_hand_sides(group, scenes, count, passes, bar=None):
-    """Right-hand sides of several scenes, by contender, each at ``count`` states of its own run."""
+    """Compare the time of evaluations of several scenes (by label), each at ``count`` states of its run."""
     contenders = []
     for label, scene in scenes.items():
         recorded = record(scene, scene.data["integration"]["duration"], count)
@@ -142,13 +143,13 @@ def right_hand_sides(group, scenes, count, passes, bar=None):
 
 
 def children_time():
-    """Processor time of all processes started so far that have ended, s."""
+    """Return the processor time of all child processes that have ended, s."""
     times = os.times()
     return times.children_user + times.children_system
 
 
 def process(scene, passes):
-    """A process that runs one scene with kernels and creep table cached, against one that only imports NumPy."""
+    """Compare a process that runs one scene, with cached kernels and creep table, with a process that imports NumPy."""
     command = [sys.executable, "-m", "wrcore", "simulate", str(scene), "--json"]
     report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
 
@@ -165,7 +166,7 @@ def process(scene, passes):
 
 
 def benchmark_table(scenes, settings):
-    """All groups as one table: scenes (title, file, changes) by name, settings ``cost.pairs`` of the configuration."""
+    """Run all benchmarks: scenes (title, file, changes) by name, settings ``cost.pairs`` of the configuration."""
     passes, count, rows = settings["passes"], settings["states"], []
 
     def scene(name, *further):

@@ -1,4 +1,4 @@
-"""Evaluations of the equations of motion at the states of a run: what a right-hand side costs where it is needed."""
+"""Timing of evaluations of the equations of motion at states of a run."""
 
 import time
 from functools import partial
@@ -15,20 +15,21 @@ from wrcore.integrate.integrator import integrate
 from wrcore.scene.compile import compile_scene
 
 LASTING = 5e-3
-"""Processor time of a timed call, s: a thousand times what a call from Python into compiled code costs."""
+"""Minimum processor time of a timed call, s; a thousand times the cost of a call from Python into compiled code."""
 
 
 class Recorded(NamedTuple):
-    """A model and states that one of its runs went through, each moved back along the track to where it began."""
+    """A model and states of one of its runs, each shifted along the track back to the starting point."""
 
     model: Model
     states: np.ndarray
-    """(n, size)."""
+    """State vectors, shape (n, size)."""
 
 
 def record(scene, duration, count):
-    """States at equal intervals of a run of a duration (s) on tangent, perfect track, which looks the same at every
-    place and time; InputError for another track.
+    """Run a scene for a duration (s) and return its model and ``count`` states at equal intervals.
+
+    The track must be tangent and without irregularity, so that it is equal at all positions; InputError otherwise.
     """
     if not scene.track.tangent:
         raise InputError(scene.source, "track", "expected a tangent, perfect track where evaluations are timed")
@@ -41,8 +42,9 @@ def record(scene, duration, count):
 
 
 def lasting(label, call, arrays, units):
-    """Contender that calls with so many copies of arrays, repeated along their first axis, that it can be timed;
-    ``units`` are those of one pass over the arrays.
+    """Return a `Contender` with arrays repeated along their first axis until a call takes about `LASTING`.
+
+    ``units`` is the number of units in one pass over the original arrays.
     """
     call(*arrays)
     started = time.process_time()
@@ -53,7 +55,7 @@ def lasting(label, call, arrays, units):
 
 
 def evaluation(label, recorded):
-    """Contender that evaluates the right-hand side at all recorded states, over and over; its units are evaluations."""
+    """Return a `Contender` that repeatedly evaluates the right-hand side at all recorded states, in evaluations."""
     equations, model, work = Equations(recorded.model).arguments
 
     def evaluate(states, rates):

@@ -1,4 +1,4 @@
-"""What runs lose: time outside the integration in a batch, and rejected steps."""
+"""Overhead of runs: time outside the integration in a batch, and rejected steps."""
 
 import cProfile
 import pstats
@@ -17,13 +17,15 @@ from wrcore.sweep.batch import run_sweep
 from wrcore.sweep.plan import load_sweep
 
 SMOOTH = 0.1
-"""Part of rejected steps that a smooth scene may have."""
+"""Maximum share of rejected steps in a smooth scene."""
 
 
 def batch_table(source, overrides, speeds, passes, functions=8):
-    """Where the time of a batch of runs, one per speed (m/s), in one process goes, as a sweep and as runs with all
-    their channels: seconds (median over the passes) and share of the whole, of integration and of what is not, then of
-    the ``functions`` that take most, with their own times, in a profiled batch.
+    """Return the time of a batch of runs in one process, one run per speed (m/s), split into parts.
+
+    The batch runs as a sweep, and as runs with all channels. Rows contain seconds (median over the passes) and share
+    of the whole batch, of the integration and of all other work. Further rows are the ``functions`` with the longest
+    times, without the functions that they call, in a profiled batch.
     """
     changes = dict(change.partition("=")[::2] for change in overrides)
     sweep = load_sweep({
@@ -52,14 +54,14 @@ def batch_table(source, overrides, speeds, passes, functions=8):
 
 
 def _timed(batch):
-    """Seconds by the wall of a batch, and of the integrations in it."""
+    """Return the wall time of a batch and the wall time of the integrations in it, s."""
     started = time.perf_counter()
     integration = batch()
     return time.perf_counter() - started, integration
 
 
 def _functions(profile, count):
-    """Rows of the functions with the longest own times."""
+    """Return rows of the functions with the longest times, without the functions that they call."""
     stats = pstats.Stats(profile).stats
     total = sum(entry[2] for entry in stats.values())
     longest = sorted(stats.items(), key=lambda item: -item[1][2])[:count]
@@ -70,8 +72,10 @@ def _functions(profile, count):
 
 
 def rejection_table(scenes, methods, tolerances):
-    """Rejected steps of every method and relative tolerance (absolute ones a thousandth) on scenes by title, their
-    share of all attempts, and whether it keeps ``SMOOTH``.
+    """Return the number of rejected steps of scenes (by title) for all methods and relative tolerances.
+
+    Absolute tolerances are a thousandth of the relative tolerances. Columns include the share of rejected steps in all
+    attempts, and ``smooth``, whether this share is at most ``SMOOTH``.
     """
     rows = []
     for title, scene in scenes.items():

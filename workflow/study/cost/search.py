@@ -1,4 +1,4 @@
-"""Cost of the contact search of one wheel: on the tread and on the flange, planar and spatial, by both reductions."""
+"""Time of the contact search of one wheel on tread and flange, by detection (planar, spatial) and reduction."""
 
 from functools import partial
 
@@ -18,12 +18,13 @@ PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.007
 """Ranges of lateral position (m) and yaw (rad) of the left wheel."""
 
 LOAD = 5e4
-"""N on the wheel, to 20 %."""
+"""Mean load of the wheel, N; loads vary by ± 20 %."""
 
 
 def loaded_wheels(contact, place, count):
-    """Left wheels at rest, in random order, that carry `LOAD` at a place (key of `PLACES`): motions
-    (count, 15), as `wrcore.wheels.hertzian_force.wheel_wrenches` takes them.
+    """Return random motions of left wheels at rest that carry `LOAD` on tread or flange (``place``, key of `PLACES`).
+
+    The array (count, 15) is an argument of `wrcore.wheels.hertzian_force.wheel_wrenches`.
     """
     rng, rows, motions = np.random.default_rng(0), np.empty((MAX_PATCHES, PATCH_COLUMNS)), []
     (low, high), (least, most) = PLACES[place]
@@ -41,7 +42,7 @@ def loaded_wheels(contact, place, count):
 
 
 def search_costs(contact, count, passes):
-    """Time of the search per wheel, of ``count`` random ones: a group of `compare` for each place and reduction."""
+    """Time the contact search for ``count`` random wheels; return rows of `compare` by place and reduction."""
     rows, patches = [], np.zeros((count, MAX_PATCHES, PATCH_COLUMNS))
     for place in PLACES:
         motions = loaded_wheels(contact, place, count)

@@ -1,8 +1,9 @@
-"""Where the time of one right-hand side goes: stages in loops of their own over the states of a run.
+"""Time of one evaluation of the right-hand side by stage, each measured separately over the states of a run.
 
-Bodies, force elements and joints are told apart by leaving them out of the model, the stages of the wheels by loops
-over the wheels' motions. A stage in a loop overlaps with itself; in the equations it waits for the one before. That
-waiting, and what puts the stages together, is the stage ``rest``.
+Times of bodies, force elements and joints are differences between models with and without them. Stages of the wheels
+are timed in loops over the wheels' motions. In such a loop consecutive calls overlap in the processor; in the full
+evaluation a stage waits for results of the previous stage. The stage ``rest`` contains this waiting and the remaining
+code between stages.
 """
 
 import math
@@ -30,15 +31,15 @@ from wrcore.kernels.jit import FUSED, jit
 from wrcore.kernels.lanes import lanes8, load8, ramp8, total
 
 CHAIN = 10**6
-"""Fused products in each of the chains that measure their rate."""
+"""Fused multiply-add operations in each of the chains that measure their rate."""
 
 BLOCK = 2048
-"""Numbers that the measurement of the first cache's bandwidth reads again and again (16 kB)."""
+"""Numbers that the measurement of the first-level cache's bandwidth reads repeatedly (16 kB)."""
 
 
 @jit(allocates=False)
 def _scan(model, motions):
-    """Pose, window and near blocks of all wheels, and the scan of their zones."""
+    """Prepare the search window of each wheel and scan its zones near contact; return a checksum."""
     found = 0.0
     for m in motions:
         window = make_window(model.geometry, make_pose(m[0], m[1], m[2], m[3], m[4], m[5], model.detection == SPATIAL))
@@ -46,14 +47,14 @@ def _scan(model, motions):
         while near > 0:
             begin, end, near = first_zone(near, model.geometry.block)
             m0, m1, m2, overlap, close = scan(window, model.geometry.scan_wheel, model.geometry.scan_rail, begin, end)
-            found += m0 + m1 + m2 + (overlap.count + overlap.first + overlap.last)  # all of it, else it is left out
+            found += m0 + m1 + m2 + (overlap.count + overlap.first + overlap.last)  # unused results are not compiled
             found += close.count + close.first + close.last
     return found
 
 
 @jit(allocates=False)
 def search_all(model, motions, patches):
-    """Patches of all wheels."""
+    """Find the contact patches of all wheels; return their number."""
     found = 0
     for i in range(motions.shape[0]):
         m, spatial = motions[i], model.detection == SPATIAL
@@ -63,7 +64,7 @@ def search_all(model, motions, patches):
 
 @jit(allocates=False, fastmath=FUSED)
 def _hertz(model, motions, patches, counts):
-    """Creepages, Hertz's ellipse and damping of all patches."""
+    """Compute creepages, Hertz ellipse and damping of all patches; return a checksum."""
     found = 0.0
     for i in range(motions.shape[0]):
         m = motions[i]
@@ -80,7 +81,7 @@ def _hertz(model, motions, patches, counts):
 
 @jit(allocates=False)
 def _creep(model, arguments):
-    """Creep forces for rows of ln(a/b), a/b and the three nondimensional creepages."""
+    """Compute creep forces for rows of ln(a/b), a/b and the three nondimensional creepages; return a checksum."""
     found = 0.0
     for row in arguments:
         f1, f2, m3, _ = creep_force_at(model.law, model.creep, row[0], row[1], 0.0, row[2], row[3], row[4])
@@ -90,7 +91,7 @@ def _creep(model, arguments):
 
 @jit(fastmath=FUSED)
 def _multiply_and_add(count):
-    """Sums of twelve independent chains of ``count`` fused products of eight numbers."""
+    """Return the sum of twelve independent chains of ``count`` fused multiply-adds of eight numbers."""
     a = b = c = d = e = f = g = h = i = j = k = m = ramp8()
     x, y = lanes8(0.999999), lanes8(1e-6)
     for _ in range(count):
@@ -101,7 +102,7 @@ def _multiply_and_add(count):
 
 @jit(fastmath=FUSED)
 def _read(numbers, turns):
-    """Sum of all numbers of one row, many times over."""
+    """Return the sum of all numbers of one row, added ``turns`` times."""
     a = b = c = d = lanes8(0.0)
     for _ in range(turns):
         for k in range(0, numbers.shape[1], 4 * LANES):
@@ -113,7 +114,7 @@ def _read(numbers, turns):
 
 @jit
 def _divide(numbers, turns):
-    """Sum of reciprocals, one by one."""
+    """Return the sum of reciprocals, computed one by one."""
     found = 0.0
     for _ in range(turns):
         for x in numbers[0]:
@@ -123,7 +124,7 @@ def _divide(numbers, turns):
 
 @jit
 def _root(numbers, turns):
-    """Sum of square roots, one by one."""
+    """Return the sum of square roots, computed one by one."""
     found = 0.0
     for _ in range(turns):
         for x in numbers[0]:
@@ -132,12 +133,13 @@ def _root(numbers, turns):
 
 
 def limits(passes):
-    """What one core can do at best, measured as the best pass: flop_per_ns (fused products, two each, of eight numbers
-    at a time), byte_per_ns (from the first cache), ns_per_division and ns_per_root (one by one, none waiting for
-    another).
+    """Return the maximum rates of one core, each measured in the fastest pass.
+
+    They are flop_per_ns (fused multiply-adds of eight numbers, counted as two operations each), byte_per_ns (reads from
+    the first-level cache), ns_per_division and ns_per_root (one by one, independent of each other).
     """
     numbers, turns = np.ones(BLOCK + LANES), CHAIN // BLOCK * LANES
-    first = -(numbers.ctypes.data // 8) % LANES  # of a cache line
+    first = -(numbers.ctypes.data // 8) % LANES  # index of the first number on a cache line
     numbers = numbers[None, first : first + BLOCK]
     contenders = [
         Contender("fused products", partial(_multiply_and_add, CHAIN), 2.0 * 12 * LANES * CHAIN),
@@ -150,7 +152,7 @@ def limits(passes):
 
 
 def _wheels(recorded):
-    """Motions, patches and their numbers of all wheels at all states, and the arguments of the creep law there."""
+    """Return motions, patches and numbers of patches of all wheels at all states, and arguments of the creep law."""
     equations = Equations(recorded.model)
     motions, patches, counts = [], [], []
     for state in recorded.states:
@@ -169,9 +171,11 @@ def _wheels(recorded):
 
 
 def breakdown(title, scene, states, passes):
-    """Time, operations and bytes of the stages of one evaluation on tangent, perfect track, averaged over states of a
-    run: a row per stage and one for the whole with nanoseconds per evaluation (median and quartiles over the passes),
-    share of the whole, and what :func:`study.cost.operations.count_operations` counts.
+    """Return time, operations and bytes of one evaluation by stage, on tangent track without irregularity.
+
+    A row per stage and a row for the whole evaluation, averaged over states of a run, contain nanoseconds per
+    evaluation (median and quartiles over the passes), share of the whole, and the counts of
+    :func:`study.cost.operations.count_operations`.
     """
     recorded = record(scene, scene.data["integration"]["duration"], states)
     model, (motions, patches, counts, creep) = recorded.model, _wheels(recorded)
@@ -202,12 +206,14 @@ def breakdown(title, scene, states, passes):
 
 
 def with_limits(tables, found):
-    """Tables of :func:`breakdown` beside what the machine can do (:func:`limits`): operations and bytes per nanosecond,
-    ``least_ns``, what sets it, and how many times longer the stage takes.
+    """Concatenate tables of :func:`breakdown` and compare them with the limits of the machine (:func:`limits`).
 
-    ``least_ns`` is the longest of three times: all sums and products at the rate of fused ones, all bytes at the first
-    cache's bandwidth, all divisions and roots one by one. What a stage takes beyond that is waiting of one operation
-    for another, branches, functions and whole numbers.
+    New columns are operations and bytes per nanosecond, the minimum time ``least_ns``, the ``limit`` that determines
+    this time, and ``times_least``, the measured time over the minimum time.
+
+    ``least_ns`` is the maximum of three times: all sums and products at the rate of fused multiply-adds, all bytes at
+    the bandwidth of the first-level cache, all divisions and roots one by one. Additional time of a stage is due to
+    operations that wait for each other, branches, mathematical functions and integer arithmetic.
     """
     table = pd.concat(tables, ignore_index=True)
     table["flop_per_ns"], table["byte_per_ns"] = table["flops"] / table["ns"], table["bytes"] / table["ns"]

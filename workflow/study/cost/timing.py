@@ -1,4 +1,4 @@
-"""Timing by turns: contenders run one after the other, again and again, so that a slow moment hits all of them."""
+"""Timing in turns: each pass runs all contenders, so that a slow moment of the machine affects all of them."""
 
 import os
 import platform
@@ -13,16 +13,16 @@ QUARTILES = (25.0, 50.0, 75.0)
 
 
 class Contender(NamedTuple):
-    """Something to time."""
+    """A call that is timed and compared with others."""
 
     label: str
     call: Callable
     units: float = 1.0
-    """How many of the group's units (evaluations, runs, ...) one call makes."""
+    """Number of the group's units (evaluations, runs, ...) in one call."""
 
 
 class Bar(NamedTuple):
-    """What a figure is asked to keep."""
+    """A required limit of a ratio or a difference of times."""
 
     contender: str
     quantity: str
@@ -33,8 +33,9 @@ class Bar(NamedTuple):
 
 
 def take_turns(contenders, passes, clock=time.process_time):
-    """Seconds per unit of each contender in each pass, shape (passes, contenders), after one pass that compiles and
-    warms up; the clock is processor time by default, which leaves out what other processes take.
+    """Return seconds per unit of each contender in each pass, shape (passes, contenders).
+
+    A first pass, which compiles and loads caches, is omitted. The default clock is the processor time of this process.
     """
     seconds = np.empty((passes + 1, len(contenders)))
     for row in seconds:
@@ -46,16 +47,17 @@ def take_turns(contenders, passes, clock=time.process_time):
 
 
 def compare(group, of, contenders, passes, unit="us", bar=None, clock=time.process_time):
-    """Rows of the table of benchmarks: contenders of a group against the first of them, ``of`` saying what a unit is.
+    """Time the contenders of a group and compare them with the first contender; return rows of the benchmark table.
 
-    group, contender, of, unit (ns, us, ms or s); median and quartiles of the time; median and quartiles of the ratio to
-    the first contender, pass by pass; excess over it; passes; the bar in words and whether it is met.
+    Columns: group, contender, of (name of the timed unit), unit of time (ns, us, ms or s); median and quartiles of the
+    time; median and quartiles of the ratio to the first contender in each pass; excess, the median difference from the
+    first contender; passes; the required limit in words (bar) and whether it is met.
     """
     return summary(group, of, [c.label for c in contenders], take_turns(contenders, passes, clock), unit, bar)
 
 
 def summary(group, of, labels, seconds, unit="us", bar=None):
-    """Rows as of :func:`compare` from seconds (passes, contenders)."""
+    """Return rows of :func:`compare` from seconds (passes, contenders)."""
     times = seconds * {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}[unit]
     rows = []
     for k, label in enumerate(labels):
@@ -76,8 +78,9 @@ def _quartiles(name, values):
 
 
 def machine():
-    """What was measured on: processor, cores, load (processes waiting or running, last minute), python, numpy,
-    numba.
+    """Return facts on the machine: processor, cores, load, and versions of python, numpy and numba.
+
+    Load is the mean number of waiting or running processes over the last minute.
     """
     processor = platform.processor() or platform.machine()
     try:

@@ -1,9 +1,9 @@
-"""Where one right-hand side waits: its machine instructions, one by one, and how often a look finds it at each of them.
+"""Time of one evaluation of the right-hand side by machine instruction, from random samples of the program counter.
 
-``python -m study.cost.waiting [scene]`` prints the instructions of one evaluation in the order in which they are
-carried out, in stretches, with the time that each stretch takes. A processor carries out several instructions at once
-where none waits for another: a stretch with few of them per nanosecond is a chain. Linux on x86-64 only, which lets one
-process follow another step by step.
+``python -m study.cost.waiting [scene]`` prints the time of consecutive stretches of the executed instructions of one
+evaluation. A processor executes several independent instructions at the same time. A stretch with few instructions per
+nanosecond is a chain in which each instruction waits for the previous instruction. This works on Linux on x86-64 only,
+where one process can trace another (ptrace).
 """
 
 import ctypes
@@ -25,28 +25,28 @@ SCENE = "config/scenes/suspended_wheelset.yaml"
 CHANGES = {"contact.patch": "moment", "speed": 60.0, "integration.duration": 10.0}
 
 STRETCH = 150
-"""Instructions in a row of the table."""
+"""Instructions per row of the table."""
 
 LOOKS = 60000
 
 INTERVAL = 50e-6
-"""Mean time between two looks, s."""
+"""Mean time between two samples, s."""
 
 MOST = 10**7
-"""Steps after which an entry that was not met is given up."""
+"""Maximum number of steps to reach the entry address."""
 
 _CONTINUE, _STEP, _REGISTERS, _SEIZE, _INTERRUPT, _ENDS_WITH_US = 7, 9, 12, 0x4206, 0x4207, 1 << 20
-"""Requests of ptrace, and its option that ends what is followed with who follows."""
+"""Requests of ptrace, and its option that ends the traced process together with the tracing process."""
 
 _POINTER, _STACK, _COUNT = 16, 19, 27
-"""Places of the instruction's and the stack's pointer in the registers, and how many registers there are."""
+"""Indices of instruction pointer and stack pointer in the registers, and the number of registers."""
 
 
 class Followed:
-    """A copy of this process that calls a function, called once here, over and over, followed from here."""
+    """A traced copy of this process that calls a function repeatedly."""
 
     def __init__(self, call):
-        call()  # compiles, if it must
+        call()  # compiles the function if necessary
         self._trace = ctypes.CDLL(None, use_errno=True).ptrace
         self._trace.argtypes = [ctypes.c_long, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
         self._trace.restype = ctypes.c_long
@@ -69,33 +69,33 @@ class Followed:
             raise OSError(ctypes.get_errno(), "expected Linux that lets one process follow another")
 
     def stop(self):
-        """Stop it where it is."""
+        """Stop the traced process at its present instruction."""
         self._ask(_INTERRUPT)
         os.waitpid(self.child, 0)
 
     def go_on(self):
-        """Let it run."""
+        """Continue the traced process."""
         self._ask(_CONTINUE)
 
     def step(self):
-        """One instruction."""
+        """Execute one instruction of the traced process."""
         self._ask(_STEP)
         os.waitpid(self.child, 0)
 
     def place(self):
-        """Addresses of the instruction that comes next, and of the stack's end."""
+        """Return the address of the next instruction and the stack pointer."""
         registers = (ctypes.c_ulonglong * _COUNT)()
         self._ask(_REGISTERS, registers)
         return registers[_POINTER], registers[_STACK]
 
     def end(self):
-        """End it."""
+        """End the traced process."""
         os.kill(self.child, signal.SIGKILL)
         os.waitpid(self.child, 0)
 
 
 def instructions(call, entry):
-    """Addresses of the instructions between the next time ``call`` comes to ``entry`` and the return from there."""
+    """Return addresses of the instructions of ``call`` from the address ``entry`` until this function returns."""
     followed, found = Followed(call), []
     try:
         for _ in range(MOST):
@@ -114,7 +114,7 @@ def instructions(call, entry):
 
 
 def looks(call, count):
-    """How often each address was found to come next, while ``call`` runs over and over, in so many looks."""
+    """Return how often each address was the next instruction in ``count`` samples while ``call`` runs repeatedly."""
     followed, found = Followed(call), Counter()
     try:
         for _ in range(count):
@@ -128,7 +128,7 @@ def looks(call, count):
 
 
 def main(scene=SCENE):
-    """Print the table for a scene."""
+    """Print instructions and times of one evaluation of a scene."""
     recorded = record(load_scene(scene, CHANGES), CHANGES["integration.duration"], 200)
     equations, model, work = Equations(recorded.model).arguments
     states = np.tile(recorded.states, (500, 1))

@@ -1,1 +1,1 @@
-"""Creep laws and tables against the exact solver and CONTACT."""
+"""Errors and computing time of creep laws and creep tables, relative to the exact solver and CONTACT."""

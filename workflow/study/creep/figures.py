@@ -1,7 +1,7 @@
 """Figures of the creep laws: curves, traction fields, cost against error, error maps, smoothness.
 
-They draw the tables of `study.creep.laws` and `study.creep.smoothness`. A law keeps its colour, marker and
-line in all of them (`LAW_STYLES`). All quantities are nondimensional (unit 1) or over a stated scale; errors are drawn
+Data are the tables of `study.creep.laws` and `study.creep.smoothness`. A law has equal colour, marker and line
+in all figures (`LAW_STYLES`). All quantities are nondimensional (unit 1) or over a stated scale; errors are drawn
 in per cent of the friction limit, costs in microseconds.
 """
 
@@ -26,7 +26,7 @@ LAW_STYLES = {
     "she": {"label": "Shen-Hedrick-Elkins", "color": "#CC79A7", "marker": "P", "linestyle": (0, (3, 1))},
     "linear": {"label": "linear", "color": "0.55", "marker": "X", "linestyle": (0, (1, 3))},
 }
-"""Okabe-Ito colours; marker and line tell the laws apart in grey too."""
+"""Okabe-Ito colours; marker and line style distinguish the laws in greyscale."""
 
 TABLE_LABELS = {"table ellipse": -13, "table sdec": 7}  # points above the marker
 COST_LABELS = {"exact": {"label": "exact, operator ready"}}
@@ -64,8 +64,9 @@ def _legend_below(figure, handles, columns, **kwargs):
 
 @styled
 def fig_creep_curves(curves):
-    """Forces of every law, one model of each family, over pure longitudinal, pure lateral, pure spin and combined
-    creepage (`study.creep.laws.creep_curves`).
+    """Plot forces of one model of each family of laws over creepage (`study.creep.laws.creep_curves`).
+
+    Panels show pure longitudinal, pure lateral, pure spin and combined creepage.
     """
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     for axes, (line, along, force, title) in zip(figure.subplots(2, 3).flat, CURVES, strict=True):
@@ -90,7 +91,7 @@ def fig_creep_curves(curves):
 
 @styled
 def fig_creep_traction(fields):
-    """Traction, stick and slip over the patch, a panel for each `ContactField` by title."""
+    """Plot traction, stick and slip over the contact patch, a panel for each `ContactField` by title."""
     figure = Figure(figsize=(7.4, 3.3), layout="constrained")
     widths = [np.ptp(field.x_edges) for field in fields.values()]
     panels = figure.subplots(1, len(fields), squeeze=False, sharey=True, width_ratios=widths)[0]
@@ -111,7 +112,7 @@ def fig_creep_traction(fields):
 
 
 def _outlines(field):
-    """Rectangles of the panels, (N, 4, 2), in the order of the field's arrays."""
+    """Return corners of the rectangular panels, (N, 4, 2), in the order of the field's arrays."""
     left, right = field.x_edges[:, 1:], field.x_edges[:, :-1]
     low, high = (np.broadcast_to(edge[:, None], left.shape) for edge in (field.y_edges[:-1], field.y_edges[1:]))
     corners = [(left, low), (right, low), (right, high), (left, high)]
@@ -136,7 +137,7 @@ def _traction(axes, field, top):
 
 
 def stick_border(field):
-    """Edges between stick and slip (and of stick with the patch's rim), as a polyline (m, 2) broken by NaN rows."""
+    """Return the border of the stick area, also at the patch's edge, as a polyline (m, 2) with NaN rows at breaks."""
     ny, n = field.x_edges.shape[0], field.x_edges.shape[1] - 1
     stick, gap = field.stick.reshape(ny, n), [np.nan, np.nan]
     rows = []
@@ -151,7 +152,7 @@ def stick_border(field):
 
 
 def _differing(field, stick, j):
-    """Intervals of x where the strips on either side of the border ``y_edges[j]`` are not both stick or both slip."""
+    """Return intervals of x where only one of the two strips at the border ``y_edges[j]`` sticks."""
     spans = [[], []]
     for side, strip in enumerate((j - 1, j)):
         if 0 <= strip < stick.shape[0]:
@@ -166,7 +167,7 @@ def _differing(field, stick, j):
 
 
 def _arrow_places(field, spacing=0.24):
-    """Panels nearest to the points of a square grid inside the patch."""
+    """Return indices of the panels nearest to the points of a square grid inside the patch."""
     x, y = (np.arange(-20, 21) * spacing for _ in range(2))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     distance = np.hypot(field.x - points[:, :1], field.y - points[:, 1:])
@@ -175,8 +176,9 @@ def _arrow_places(field, spacing=0.24):
 
 @styled
 def fig_creep_cost(laws, contact):
-    """Cost per case against the error that 95 % of the cases keep, for all laws, tables and levels: rows of
-    `laws_table` against CONTACT on ellipses, and `contact_points`.
+    """Plot time per case over the 95 % quantile of the error, for all laws, tables and levels.
+
+    Data are rows of `laws_table` relative to CONTACT on ellipses, and `contact_points`.
     """
     figure = Figure(figsize=(6.8, 4.6), layout="constrained")
     axes = figure.subplots()
@@ -223,7 +225,7 @@ def _annotate(axes, text, at, offset):
 
 @styled
 def fig_creep_error_map(errors, name):
-    """Where a table errs (`error_map`): over a/b with the size of creepage, the spin direction, the patch's shape."""
+    """Plot errors of a table (`error_map`) over a/b and over creepage size, spin direction and shape number psi."""
     inputs = [("size", "size of creepage $r$ / 1"), ("beta", r"spin direction $\beta$ / rad")]
     inputs += [("psi", r"shape number $|\psi|$ / 1")] if np.ptp(errors["psi"]) > 0 else []
     figure = Figure(figsize=(0.8 + 2.2 * len(inputs), 4.6), layout="constrained")
@@ -240,8 +242,10 @@ def fig_creep_error_map(errors, name):
 
 
 def binned_errors(errors, column, error, share=0.95):
-    """Quantile (``share``) of an error in cells of a/b (logarithmic) and another input (logarithmic for "size"):
-    edges_a_over_b (n + 1,), edges (m + 1,), quantile (n, m), NaN in cells without a case.
+    """Return the quantile ``share`` of an error in cells of a/b and another input.
+
+    Edges are logarithmic for a/b and "size". Returned are edges_a_over_b (n + 1,), edges (m + 1,) and quantile (n, m),
+    NaN in cells without a case.
     """
     patches = errors["a_over_b"].nunique()
     counts = (max(1, patches // 20), 5) if column == "psi" else (min(14, patches), 10)  # some patches in each cell
@@ -250,7 +254,7 @@ def binned_errors(errors, column, error, share=0.95):
         log = name in ("a_over_b", "size")
         low, high = errors[name].min(), errors[name].max() * (1 + 1e-9)
         edges.append(np.geomspace(low, high, count + 1) if log else np.linspace(low, high, count + 1))
-        edges[-1][0] = low  # geomspace may round it up
+        edges[-1][0] = low  # geomspace may round the minimum up
     cell = [
         np.searchsorted(edge, errors[name], "right") - 1 for edge, name in zip(edges, ("a_over_b", column), strict=True)
     ]
@@ -277,7 +281,7 @@ SMOOTH_PANELS = {
     "axis": ("(c) past pure spin,\nless its mean", r"place $x = \xi'/\varphi'$ / 1", True),
     "zero": ("(d) through zero creepage:\nfull adhesion", "place $x$ / 1", False),
 }
-"""Title, label and whether the mean is taken off, of each of `study.creep.smoothness.smooth_lines`."""
+"""Title, label of x, and whether the mean is subtracted, for each line of `study.creep.smoothness.smoothness`."""
 
 
 OUTPUTS = {
@@ -289,8 +293,9 @@ OUTPUTS = {
 
 @styled
 def fig_creep_smoothness(lines, table):
-    """A creep table's forces and slopes along lines that cross its cells, its pole and zero creepage (`smoothness`;
-    dots are the exact solver); the variation of F_x's slope at the pole (`smoothness_table`) is written in.
+    """Plot forces and slopes of a creep table along lines across its cells, its pole and zero creepage (`smoothness`).
+
+    Dots are the exact solver. A text states the variation of the slope of F_x at the pole (`smoothness_table`).
     """
     figure = Figure(figsize=(8.4, 4.6), layout="constrained")
     panels = figure.subplots(2, 4, sharex="col")

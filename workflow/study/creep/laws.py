@@ -1,7 +1,8 @@
-"""What creep laws and creep tables err and cost: tidy tables against CONTACT's cases and against the exact solver.
+"""Errors and computing time of creep laws and creep tables, relative to CONTACT and to the exact solver.
 
-Everything is nondimensional (see `wrcore.creep.laws`): creepages xi', eta', phi', forces over mu N, moments over
-mu N c, c = sqrt(a b). A force error is the length of the error of (fx, fy), a moment error the size of that of mz.
+All quantities are nondimensional (see `wrcore.creep.laws`): creepages xi', eta', phi', forces over mu N, moments over
+mu N c, c = sqrt(a b). A force error is the length of the error vector of (fx, fy), a moment error the absolute error
+of mz.
 """
 
 import time
@@ -26,7 +27,7 @@ _WARM_UP = Resolution(4, 4, 4, 8, 4, 6)
 
 
 class ReferenceCases(NamedTuple):
-    """One file of reference cases, nondimensional: names, patches (n,), creepages (n, 3), CONTACT's forces (n, 3)."""
+    """Reference cases of one file, nondimensional: names, patches (n,), creepages (n, 3), CONTACT's forces (n, 3)."""
 
     case_id: np.ndarray
     g: np.ndarray
@@ -36,7 +37,7 @@ class ReferenceCases(NamedTuple):
 
 
 class Model(NamedTuple):
-    """One law with its data; ``family`` is the law, with the planes for a table ("table ellipse", "table sdec")."""
+    """A creep law with its data; ``family`` is the law, for a table with its planes ("table ellipse", "table sdec")."""
 
     name: str
     family: str
@@ -45,8 +46,10 @@ class Model(NamedTuple):
 
 
 def read_reference(folder):
-    """CONTACT's cases by file, from a folder with `REFERENCE_FILES` in the columns of ``wrcore creep`` with Fx_N, Fy_N,
-    Mz_Nm; InputError if a file is missing or a column or value is not as `wrcore.creep.cases.check_cases` expects.
+    """Read CONTACT's cases from the `REFERENCE_FILES` in a folder; return them by file.
+
+    Columns are those of ``wrcore creep`` with Fx_N, Fy_N, Mz_Nm. InputError if a file is missing or
+    `wrcore.creep.cases.check_cases` rejects a column or value.
     """
     return {name: _read_cases(Path(folder) / file) for name, file in REFERENCE_FILES.items()}
 
@@ -65,7 +68,7 @@ def _read_cases(path):
 
 
 def creep_models(nu, tables, grids):
-    """Linear, SHE, Polach, FASTSIM on each grid (steps along x and strips across), and each table, for Poisson's nu."""
+    """Return models of linear law, SHE, Polach, FASTSIM on each n x n grid, and tables, for Poisson's ratio nu."""
     plain = {"linear": "linear", "she": "SHE", "polach": "Polach"}
     models = [Model(name, law, LAWS[law], creep_data(nu)) for law, name in plain.items()]
     models += [Model(f"FASTSIM {n} x {n}", "fastsim", LAWS["fastsim"], creep_data(nu, grid=n)) for n in grids]
@@ -73,12 +76,15 @@ def creep_models(nu, tables, grids):
 
 
 def table_model(name, table):
-    """A `CreepTable` as a `Model`."""
+    """Return a `CreepTable` as a `Model`."""
     return Model(name, f"table {table.planes}", LAWS["table"], creep_data(table.nu, table.kernel_data()))
 
 
 def law_forces(model, g, psi, creepages):
-    """Forces (n, 3) of a `Model` for g and psi (scalars or (n,)) and creepages (n, 3), and the count out of range."""
+    """Return forces (n, 3) of a `Model` and the number of patches outside the range of its data.
+
+    g and psi are scalars or (n,), creepages (n, 3).
+    """
     forces = np.empty((len(creepages), 3))
     g, psi = (np.broadcast_to(np.asarray(value, dtype=float), len(creepages)).copy() for value in (g, psi))
     outside = creep_forces(model.law, model.data, g, psi, np.ascontiguousarray(creepages, dtype=float), forces)
@@ -86,7 +92,7 @@ def law_forces(model, g, psi, creepages):
 
 
 def exact_forces(cases, nu, level):
-    """Forces (n, 3) of `ReferenceCases` by the exact solver at one level."""
+    """Return forces (n, 3) of `ReferenceCases` from the exact solver at one level of resolution."""
     solved = [
         RollingContact(g, psi, nu, level).solve_many(creepages[None])[0][0]
         for g, psi, creepages in zip(cases.g, cases.psi, cases.creepages, strict=True)
@@ -99,11 +105,12 @@ def _sizes(difference):
 
 
 def error_table(reference, models, nu, levels):
-    """Error of every law and of the exact solver at rising levels, the last of which is the reference "exact", in every
-    reference case.
+    """Return errors of all laws and of the exact solver in all reference cases, relative to CONTACT and "exact".
+
+    The reference "exact" is the exact solver at the last of the rising ``levels`` of resolution.
 
     Rows: file x model x reference x case. Columns cases, model, family, against ("CONTACT" or "exact"), case_id,
-    force_error, moment_error, out_of_range (patches of this file that the model's data do not cover).
+    force_error, moment_error, out_of_range (number of patches of this file outside the range of the model's data).
     """
     import pandas as pd
 
@@ -125,7 +132,10 @@ def error_table(reference, models, nu, levels):
 
 
 def random_arguments(count, planes, seed=0):
-    """Patches and creepages all over the tables' range: g (n,), psi (n,) (0 for planes "ellipse"), creepages (n, 3)."""
+    """Return random patches and creepages over the range of the tables.
+
+    They are g (n,), psi (n,) (0 for planes "ellipse") and creepages (n, 3).
+    """
     rng = np.random.default_rng(seed)
     g = np.exp(rng.uniform(*np.log(A_OVER_B), count))
     psi = rng.uniform(-PSI_MAX, PSI_MAX, count) * (planes == "sdec")
@@ -133,11 +143,11 @@ def random_arguments(count, planes, seed=0):
 
 
 def time_models(models, cases, nu, levels, passes):
-    """CPU seconds per case (s_per_case) of every law and level; in each pass all of them take their turn.
+    """Measure CPU seconds per case (s_per_case) of all laws and levels, which run in turn in each pass.
 
-    Laws run over random arguments in a compiled loop, the exact solver over the given cases one by one. A pass that is
-    not kept comes first, so that compilation and first loads are outside. A single exact case costs its operator and
-    one solution ("from nothing"); where cases share a patch, one solution ("ready").
+    Laws run over random arguments in a compiled loop, the exact solver over the given cases one by one. A first pass is
+    omitted, so that times exclude compilation and loading. The work of an exact case is its operator and one solution
+    ("from nothing"), or one solution if the operator of its patch exists ("ready").
     """
     import pandas as pd
 
@@ -164,7 +174,7 @@ def _time_law(model):
 
 
 def _time_exact(cases, nu, level, count):
-    """Mean CPU seconds of an operator and of one solution with it, over the first ``count`` cases."""
+    """Return mean CPU seconds of an operator and of one solution with this operator, over the first ``count`` cases."""
     operator = solution = 0.0
     for i in range(count):
         start = time.process_time()
@@ -176,9 +186,11 @@ def _time_exact(cases, nu, level, count):
 
 
 def laws_table(errors, costs, tables):
-    """One row per file, reference and model from `error_table`, `time_models` and creep ``tables`` (name, memory_MB,
-    build_s): force_<quantile> and moment_<quantile> (`QUANTILES`), us_per_case and us_from_nothing (medians over the
-    passes), memory_MB, build_s (NaN where there is nothing to build), out_of_range.
+    """Return errors and computing time, one row per file, reference and model.
+
+    ``errors`` are from `error_table`, ``costs`` from `time_models`; creep ``tables`` have name, memory_MB and build_s.
+    Columns: force_<quantile> and moment_<quantile> (`QUANTILES`), us_per_case and us_from_nothing (medians over the
+    passes), memory_MB and build_s (NaN for models without a table), out_of_range.
     """
     keys = ["cases", "against", "model", "family"]
     grouped = errors.groupby(keys, sort=False)
@@ -198,7 +210,7 @@ def laws_table(errors, costs, tables):
 
 
 def laws_markdown(laws):
-    """The table of `laws_table` for reading: errors in per cent, one section per file and reference."""
+    """Format the table of `laws_table` as Markdown: errors in per cent, one section per file and reference."""
     names = {f"{error}_{q}": f"{symbol} {q.replace('q', '')}" for error, symbol in ERRORS.items() for q in QUANTILES}
     units = {"us_per_case": "µs", "us_from_nothing": "µs with operator", "memory_MB": "MB", "build_s": "build s"}
     parts = [
@@ -214,8 +226,10 @@ def laws_markdown(laws):
 
 
 def timed_table(name, nu, planes, tolerance, progress=None):
-    """Build a creep table (`wrcore.creep.table.build_table`) and measure what that costs, compilation apart: the table,
-    and a row with name, build_s (CPU seconds with the random check) and all of `wrcore.creep.table.table_info`.
+    """Build a creep table (`wrcore.creep.table.build_table`) and measure the time without compilation.
+
+    Returned are the table and a row with name, build_s (CPU seconds including the check at random points) and all
+    entries of `wrcore.creep.table.table_info`.
     """
     random_errors(build_data(nu, planes, _WARM_UP), _WARM_UP.level, patches=1, per_patch=2)
     start = time.process_time()
@@ -224,9 +238,10 @@ def timed_table(name, nu, planes, tolerance, progress=None):
 
 
 def contact_points(folder):
-    """CONTACT's own errors (force_q95) and times (us_per_case), measured elsewhere on another machine
-    (`CONTACT_TIMES`), over the first ellipse cases: program is "CONTACT" (given Hertz pressure, the faster of its two
-    solvers) or "its FASTSIM" (parabolic bound).
+    """Return errors (force_q95) and times (us_per_case) of CONTACT over its resolution, from `CONTACT_TIMES`.
+
+    They were measured on another machine over the first ellipse cases. The program is "CONTACT" (with given Hertz
+    pressure, the faster of its two solvers) or "its FASTSIM" (parabolic traction bound).
     """
     import pandas as pd
 
@@ -242,7 +257,7 @@ def contact_points(folder):
 
 
 def curve_creepages(points, translation=1.0, spin=4.0, held_spin=0.6):
-    """Lines of creepages (points, 3) by name, each with the index of the creepage that varies."""
+    """Return lines of creepages (points, 3) by name, each with the index of the creepage that varies."""
     up, through, zero = np.linspace(0, 1, points), np.linspace(-1, 1, points), np.zeros(points)
     return {
         "longitudinal": (np.stack([translation * up, zero, zero], axis=1), 0),
@@ -253,8 +268,10 @@ def curve_creepages(points, translation=1.0, spin=4.0, held_spin=0.6):
 
 
 def creep_curves(models, nu, a_over_b, level, points):
-    """Forces of every law and of the exact solver (family "exact") at a level along lines of creepage ("longitudinal",
-    "lateral", "spin", "combined": lateral at a held spin): line, model, family, xi, eta, phi, fx, fy, mz.
+    """Compute forces of all laws and of the exact solver (family "exact") at a level along lines of creepage.
+
+    Lines are "longitudinal", "lateral", "spin" and "combined" (lateral at constant spin). Columns: line, model, family,
+    xi, eta, phi, fx, fy, mz.
     """
     import pandas as pd
 

@@ -1,6 +1,6 @@
-"""What one creep table errs over its range, and how smooth it is along lines of creepage.
+"""Errors of a creep table over its range, and smoothness of its forces along lines of creepage.
 
-Units as in `study.creep.laws`: nondimensional creepages and forces.
+Units are those of `study.creep.laws`: nondimensional creepages and forces.
 """
 
 import numpy as np
@@ -11,26 +11,27 @@ from wrcore.creep.axes import creepages_at, scales
 from wrcore.creep.kalker import coefficients_at
 
 SIZES, DIRECTIONS = 16, 10
-"""Sizes of creepage and spin directions for each patch of the error map."""
+"""Number of creepage sizes and number of spin directions for each patch of the error map."""
 
 SIZE_RANGE = (0.01, 100.0)
 NEAR_POLE = 1e-3
 """Distance xi'/phi' (and eta'/phi') at which the smoothness lines pass the spin axis."""
 
 SPAN = 4
-"""Points over which a jump of the slope is sought: more than the three that a central difference takes."""
+"""Number of points between compared slopes; larger than the three points of a central difference."""
 
 _TIGHT = 1e-5
 
 
 def _stratified(low, high, count, rng):
-    """One uniform draw from each of ``count`` equal parts of an interval."""
+    """Return one uniform random number from each of ``count`` equal parts of an interval."""
     return low + (high - low) * (np.arange(count) + rng.uniform(size=count)) / count
 
 
 def sized_creepages(g, size, alpha, beta, kalker):
-    """Creepages (..., 3) of a size r and a direction (alpha, beta) as `wrcore.creep.axes` defines them; without spin
-    the linear force is 3 r mu N, so that full slip comes near r = 1.
+    """Return creepages (..., 3) of a size r and a direction (alpha, beta) as defined in `wrcore.creep.axes`.
+
+    Without spin the linear force is 3 r mu N, so that full slip begins near r = 1.
     """
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     rate = scales(g, c11, c22, c23)[-1]
@@ -38,8 +39,10 @@ def sized_creepages(g, size, alpha, beta, kalker):
 
 
 def error_map(model, patches, level, seed=0):
-    """Error of a table against the exact solver all over its range, at one random patch from each pair of parts of the
-    range of ln(a/b) and of abs(psi): a_over_b, psi, size, alpha, beta, force_error, moment_error.
+    """Compute errors of a table relative to the exact solver over its range, at stratified random patches.
+
+    The ranges of ln(a/b) and of abs(psi) are divided into ``patches[0]`` parts, each with one random value; this is
+    repeated ``patches[1]`` times. Columns: a_over_b, psi, size, alpha, beta, force_error, moment_error.
     """
     import pandas as pd
 
@@ -61,10 +64,10 @@ def error_map(model, patches, level, seed=0):
 
 
 def smooth_lines(axes):
-    """Lines through a table by name: a function of x (n,) that gives g, psi (n,), creepages (n, 3), and the reach of x.
+    """Return lines through a table by name: a function of x (n,) and the maximum of abs(x).
 
-    "cells" crosses cells in all inputs at once; "axis" passes the spin axis, the pole of the table's polar inputs, at
-    `NEAR_POLE`; "zero" runs through zero creepage.
+    The functions return g, psi (n,) and creepages (n, 3). "cells" crosses cells in all inputs at once; "axis" passes
+    the spin axis, the pole of the table's polar inputs, at the distance `NEAR_POLE`; "zero" contains zero creepage.
     """
 
     def cells(x):
@@ -81,9 +84,10 @@ def smooth_lines(axes):
 
 
 def smoothness(model, level, points, exact_points):
-    """Forces and slopes of a table along `smooth_lines` and, on one of them, where it bends most, a hundredfold
-    ("border"), with the exact solver at fewer points: line, source ("table", "exact"), x, fx, fy, mz, and slopes dfx,
-    dfy, dmz (central differences along x). ``points`` is odd.
+    """Compute forces and slopes of a table along `smooth_lines`, and of the exact solver at fewer points.
+
+    The line "border" is the part of "cells" with the sharpest bend at 100 times the resolution. Columns: line, source
+    ("table", "exact"), x, fx, fy, mz, and slopes dfx, dfy, dmz (central differences along x). ``points`` is odd.
     """
     import pandas as pd
 
@@ -113,7 +117,7 @@ def _along(line, source, x, forces):
 
 
 def _exact_along(places, nu, level):
-    """Exact forces along a line; patches that follow each other unchanged share their operator."""
+    """Return exact forces along a line; a line with constant patch shape uses a single operator."""
     g, psi, creepages = places
     if np.ptp(g) == 0 and np.ptp(psi) == 0:
         return RollingContact(g[0], psi[0], nu, level).solve_many(creepages, _TIGHT)[0]
@@ -124,12 +128,11 @@ def _exact_along(places, nu, level):
 
 
 def smoothness_table(lines):
-    """How much the slopes vary along each line of `smoothness`, and whether they jump, a row per line, source and
-    output.
+    """Return measures of variation and jumps of the slopes of `smoothness`, a row per line, source and output.
 
-    Columns: slope (largest size), variation (largest minus smallest slope over the largest size) and, for the table,
-    step (largest change of the slope over `SPAN` points over the same) and step_ratio: that step over the one of twice
-    the span. A slope without jumps gives 0.5, a jump gives 1.
+    Columns: slope (maximum absolute value) and variation (maximum minus minimum slope, over ``slope``). For the table
+    also step (maximum change of the slope over `SPAN` points, over ``slope``) and step_ratio (this change over the
+    change for twice the span). The ratio is 0.5 for a slope without jumps and 1 at a jump.
     """
     import pandas as pd
 

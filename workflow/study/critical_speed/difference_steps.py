@@ -1,8 +1,8 @@
-"""How far a linear critical speed is that of exact contact, and not of the step of its difference quotients.
+"""Dependence of the linear critical speed with exact contact on the step of the difference quotients.
 
 ``python -m study.critical_speed.difference_steps`` prints the critical speed of the suspended wheelset by patch model,
-resolution and step: strips follow a patch's outline only so far, so that the slopes of exact contact depend on over how
-much they are taken; looked-up contact is a smooth function.
+resolution and step. Strips of finite width approximate a patch's outline, so that difference quotients of exact contact
+depend on their step. Contact from the lookup table is a smooth function.
 """
 
 import numpy as np
@@ -13,19 +13,19 @@ from wrcore.analysis.stability.stability import steady_motion, straight_ahead
 from wrcore.balance import linear
 
 SPEEDS = 57.0, 59.0
-"""m/s: either side of the critical speed, over which the growth is a straight line."""
+"""Speeds below and above the critical speed, m/s; the growth rate is interpolated linearly between them."""
 
 STEPS = 1e-7, 1e-6, 1e-5, 2e-5
-"""m and rad."""
+"""Steps of the difference quotients, m and rad."""
 
 MODELS = ("moment", ""), ("exact", "coarse"), ("exact", "middle"), ("exact", "fine"), ("tabulated", "middle")
 
 HUNTING = 38.0, 60.0
-"""Between these frequencies lies the wheelset's hunting at those speeds, 1/s; the frame's modes lie below."""
+"""Range of the angular frequency of hunting at these speeds, rad/s; modes of the frame have lower frequencies."""
 
 
 def growth(patch, resolution, speed, step):
-    """Growth of the hunting mode, 1/s."""
+    """Return the growth rate of the hunting mode, 1/s."""
     changes = {"contact.patch": patch} | ({"contact.resolution": resolution} if resolution else {})
     model, state = straight_ahead(wr.load_scene(wr.example("suspended_wheelset"), changes))
     usual, linear.STEP = linear.STEP, step
@@ -37,7 +37,7 @@ def growth(patch, resolution, speed, step):
 
 
 def table():
-    """Critical speeds, m/s: a row per model, a column per step."""
+    """Return critical speeds, m/s, with a row per model and a column per step."""
     rows = {}
     for patch, resolution in MODELS:
         for step in STEPS:

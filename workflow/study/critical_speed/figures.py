@@ -1,6 +1,6 @@
-"""Figures of stability: root locus over speed, the modes at one speed, limit cycles over speed.
+"""Figures of stability: root locus over speed, modes at one speed, limit cycles over speed.
 
-They work on tables of `wrcore.analysis.stability.stability`. Units change here and nowhere before: lengths to mm.
+Data are tables of `wrcore.analysis.stability.stability` in SI units; these functions convert lengths to mm.
 """
 
 import numpy as np
@@ -14,16 +14,18 @@ from wrcore.analysis.stability.modes import OVERDAMPED
 GREY = "0.72"
 
 HIGHEST = 20.0
-"""Frequency up to which the root locus is drawn, Hz; contact and bush modes lie above."""
+"""Maximum frequency in the figure of the root locus, Hz; modes of contact and bushes have higher frequencies."""
 
 LEAST_ENERGY = 0.05
-"""Coordinates with less of the energy in every mode are left out of the table of modes."""
+"""Minimum share of the kinetic energy in any mode for a coordinate to be shown in the figure of modes."""
 
 
 @styled
 def fig_root_locus(loci, linear):
-    """Damping ratio and frequency of all oscillations over speed (tables of `loci` by title of the row of panels);
-    hunting stands out, and the variant ``spatial`` of `critical_speeds` (``linear``) is marked.
+    """Plot damping ratio and frequency of all oscillating modes over speed, with hunting modes in colour.
+
+    ``loci`` are tables of `study.critical_speed.tables.loci` by title of the row of panels. A line marks the variant
+    ``spatial`` of `critical_speeds` (``linear``).
     """
     figure = Figure(figsize=(7.0, 0.6 + 2.3 * len(loci)), layout="constrained")
     panels = figure.subplots(len(loci), 2, sharex=True, squeeze=False)
@@ -51,15 +53,16 @@ def fig_root_locus(loci, linear):
 
 
 def _critical(table):
-    """Linear critical speed with spatial detection, m/s; NaN where there is none."""
+    """Return the linear critical speed with spatial detection, m/s; NaN if it does not exist."""
     speed = table.set_index("variant").loc["spatial", "critical_speed_m_per_s"]
     return speed if np.isfinite(speed) else np.nan
 
 
 @styled
 def fig_modes(table, title):
-    """Modes at one speed (first table of `modes`): frequency, damping, and where their kinetic energy is. What does not
-    oscillate is left out; modes of equal name, frequency and damping stand in one row.
+    """Plot frequency, damping and distribution of kinetic energy of the modes at one speed (first table of `modes`).
+
+    Modes without oscillation are omitted; modes of equal name, frequency and damping share a row.
     """
     table = table[table["damping_ratio"] < OVERDAMPED]
     labels = pd.Series(
@@ -67,7 +70,7 @@ def fig_modes(table, title):
         for mode in table.itertuples()
     )
     times = labels.map(labels.value_counts())
-    rows = np.flatnonzero(~labels.duplicated())  # modes of equal wheelsets that hardly know of each other
+    rows = np.flatnonzero(~labels.duplicated())  # equal modes of equal, nearly uncoupled wheelsets
     parts = table.iloc[rows, table.columns.get_loc("part") + 1 :]
     parts = parts.loc[:, parts.max() >= LEAST_ENERGY]
     labels = [labels[row] if times[row] == 1 else f"{times[row]} times {labels[row]}" for row in rows]
@@ -88,10 +91,10 @@ def fig_modes(table, title):
 
 @styled
 def fig_limit_cycles(tables, linear):
-    """Amplitude of wheelsets over speed (`limit_cycles` with a column detection, by title of the panel): what a large
-    and what a small disturbance leave; the variant ``spatial`` of `critical_speeds` (``linear``) is marked.
+    """Plot the amplitude of limit cycles over speed, after a large disturbance and after a small disturbance.
 
-    Irregular motions are stars that no line joins, motions that end beside the rails are crosses at the top.
+    ``tables`` of `limit_cycles` with a column detection are by title of the panel. A line marks the variant ``spatial``
+    of `critical_speeds` (``linear``). Stars without a line are irregular motions; crosses at the top are derailments.
     """
     figure = Figure(figsize=(7.0, 0.6 + 2.4 * len(tables)), layout="constrained")
     panels = figure.subplots(len(tables), 1, squeeze=False)[:, 0]

@@ -1,4 +1,4 @@
-"""Linear and nonlinear critical speeds side by side."""
+"""Tables of root loci, and of linear and nonlinear critical speeds."""
 
 import pandas as pd
 
@@ -7,8 +7,9 @@ from wrcore.analysis.stability.stability import rising, root_locus, straight_ahe
 
 
 def loci(scenes, speeds):
-    """Tables of `root_locus` of one vehicle at rising ``speeds`` (m/s) in several scenes by detection, after a column
-    of that name.
+    """Return root loci of one vehicle at rising ``speeds`` (m/s), for several scenes by detection.
+
+    A column ``detection`` precedes the columns of `root_locus`.
     """
     speeds = rising(speeds)
     tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}
@@ -16,8 +17,10 @@ def loci(scenes, speeds):
 
 
 def critical_table(linear, cycles):
-    """Linear (`critical_speeds`; variants ``planar`` and ``spatial``) and nonlinear critical speeds (`limit_cycles`
-    with a column detection), both by vehicle: a row per vehicle and detection.
+    """Return linear and nonlinear critical speeds, a row per vehicle and detection.
+
+    Both arguments are by vehicle: ``linear`` tables of `critical_speeds` with the variants ``planar`` and ``spatial``,
+    ``cycles`` tables of `limit_cycles` with a column detection.
     """
     rows = []
     for vehicle, table in linear.items():

@@ -1,1 +1,1 @@
-"""What models of contact do on a crossing: height of the wheel, load on the nose, pressure, cost."""
+"""Comparison of contact models on a crossing: height of the wheel, load on the nose, pressure, computing time."""

@@ -1,4 +1,4 @@
-"""A wheel over the nose of a crossing. Units change here: m to mm, Pa to GPa."""
+"""Figure of a wheel on the nose of a crossing. It converts SI units: m to mm, Pa to GPa."""
 
 from matplotlib.figure import Figure
 
@@ -11,7 +11,7 @@ GPA = 1e-9
 
 @styled
 def fig_nose(table):
-    """Height of the wheelset, load of the nose and greatest pressure over the place, from `nose.over_the_nose`."""
+    """Plot height of the wheelset, load on the nose and maximum pressure over position, from `nose.over_the_nose`."""
     figure = Figure(figsize=(6.8, 6.4), layout="constrained")
     panels = figure.subplots(3, sharex=True)
     for (name, part), look in zip(table.groupby("model", sort=False), LOOKS, strict=False):

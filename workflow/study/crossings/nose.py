@@ -1,4 +1,4 @@
-"""A loaded wheelset laid on a crossing, place by place, by every patch model and both detections."""
+"""Static contact of a loaded wheelset along a crossing, for patch models and both detections."""
 
 import time
 
@@ -9,23 +9,25 @@ from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact.changing_rails.sections import WheelOnSlices
 from wrcore.contact.search import reduction as columns
 
-SIDE = "right"  # that of the crossing
+SIDE = "right"  # side of the crossing
 
 
 def wheel_on_crossing(scene):
-    """`WheelOnSlices` of the side of a scene with ``track.crossing: {rail: right}``."""
+    """Return the `WheelOnSlices` of the right side of a scene with ``track.crossing: {rail: right}``."""
     pair, slices = scene.alike, scene.crossings[0].rails[1]
     return WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
 
 
 def over_the_nose(pair, models, places, load, yaw):
-    """Table of a wheel under a load (N), with a row per model, a dict of ``patch`` and ``detection`` by its name, and
-    place (n,), m from where the nose begins: height of the wheelset's centre (m), share of the load on the nose,
-    greatest pressure (Pa), and processor time (s). Detections differ in a yaw (rad)."""
+    """Compute the static contact of a wheel under a load (N) at positions along the nose, a row per model and position.
+
+    ``models`` are dicts of ``patch`` and ``detection`` by name; ``places`` (n,) are positions from the beginning of the
+    nose, m. Columns: height of the wheelset's centre (m), share of the load on the nose, maximum pressure (Pa), and
+    processor time (s). The two detections differ only if the yaw (rad) is not zero."""
     begins, rows = pair.rail.begins()[0], []
     for name, model in models.items():
         wheels = LoadedOnSlices(pair, model["patch"], detection=model["detection"])
-        for k, place in enumerate([places[0], *places]):  # the first one once more: compilation
+        for k, place in enumerate([places[0], *places]):  # the first position twice: its first pass compiles
             wheels.s, began = begins + place, time.process_time()
             z = wheels.height(SIDE, 0.0, load, yaw=yaw)
             found = wheels.at_height(SIDE, 0.0, z, yaw=yaw)
@@ -38,7 +40,7 @@ def over_the_nose(pair, models, places, load, yaw):
 
 
 def _on_nose(rail, s, row):
-    """Whether a patch lies on the nose, the inner one of two heads."""
+    """Whether a patch lies on the nose, the inner one of two rail heads in a section."""
     heads = rail.heads(s + row[columns.X])
     if len(heads) < 2:
         return s + row[columns.X] >= rail.begins()[0]
@@ -46,8 +48,10 @@ def _on_nose(rail, s, row):
 
 
 def summary(table):
-    """What each model errs against the first one, which is exact: height (m, median and greatest), place at which the
-    nose carries half (m), greatest pressure (part, median and worst); and its cost (s, median)."""
+    """Return errors of each model relative to the first model, which is exact, and its processor time.
+
+    Columns: error of height (m, median and maximum), of the position at which the nose carries half the load (m), and
+    relative error of the maximum pressure (median and maximum); processor time (s, median)."""
     by_model, rows = {name: part.set_index("place_m") for name, part in table.groupby("model", sort=False)}, []
     exact = next(iter(by_model.values()))
     for name, part in by_model.items():
@@ -59,7 +63,7 @@ def summary(table):
 
 
 def half_way(part):
-    """Place at which the nose first carries half of the load, m."""
+    """Return the position at which the nose first carries half of the load, m; NaN if this is not within the table."""
     share, place = part.share_of_nose.to_numpy(), part.index.to_numpy()
     k = int(np.argmax(share >= 0.5))
     if k == 0:
