@@ -11,7 +11,7 @@ CONTACT = {
 """Columns of `study.contact.reference.compare_with_contact`: name, factor to the printed unit, and unit."""
 
 NEAR = 6e-3
-"""Largest lateral position of the rows "y up to 6 mm", m; wheels stand on their flanges at larger ones."""
+"""Largest lateral position of the rows "y up to 6 mm", m; at larger positions wheels stand on their flanges."""
 
 
 def _row(what, of, cases, values, unit):
@@ -61,7 +61,7 @@ def patch_claims(summary):
 def speed_claims(front):
     """Return minimum, median and maximum real-time factor by kind of scene and speed.
 
-    Only choices on the fronts of speed against error with an error of y below 10 µm (RMS) are included.
+    Only choices on the Pareto fronts with an error of y below 10 µm (RMS) are included.
     """
     sound = front[front["y_rms_m"] < 1e-5]
     rows = [

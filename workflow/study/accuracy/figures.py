@@ -1,4 +1,4 @@
-"""Figures of speed against error.
+"""Figures of speed against error of modelling and integration choices.
 
 Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 """

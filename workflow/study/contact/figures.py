@@ -1,8 +1,8 @@
 """Figures of contact position, rolling radius difference, conicity, errors of planar detection, and reductions.
 
-The first ones work on the table of `wrcore.contact.rigid.first_touch.first_touch` and on curves of
-`wrcore.contact.rigid.conicity.conicity_curve`, the others on tables of `study.contact.tables`. Units change here and
-nowhere before: lengths to mm, angles to mrad, forces to kN.
+Data are tables of `wrcore.contact.rigid.first_touch.first_touch`, curves of
+`wrcore.contact.rigid.conicity.conicity_curve`, and tables of `study.contact.tables`. These functions convert SI units:
+lengths to mm, angles to mrad, forces to kN.
 """
 
 import numpy as np

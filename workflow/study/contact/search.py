@@ -200,7 +200,7 @@ def _judge_all(geometry, poses, depths, spatial, reduction, outcomes, details):
 
 @jit
 def _touching(geometry, side, y, z, axle, spatial):
-    """Return the height of first touch of the wheel, m, from strips 0.1 mm apart; an error of 1 µm is acceptable."""
+    """Return the height of first touch of the wheel, m, from strips every 0.1 mm; an error of 1 µm is acceptable."""
     pose = make_pose(side, y, z, axle[0], axle[1], axle[2], spatial)
     lowest = 1.0
     for k in range(int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / 1e-4)):

@@ -49,7 +49,7 @@ def rail_surface(rail, track, side, u, s):
 
 
 def _along(track, s, side):
-    """Return centre line (..., 3), frames (..., 3, 3), and a rail's lateral and vertical deviation (..., 2) at s, m."""
+    """Return centre line (..., 3), frames (..., 3, 3) and lateral and vertical deviation of a rail (..., 2) at s."""
     position, frames, deviation = np.empty((s.size, 3)), np.empty((s.size, 3, 3)), np.zeros((s.size, 2))
     first, values = (0 if side == "left" else 2), np.zeros((3, 4))
     for i, at in enumerate(s.flat):

@@ -163,7 +163,7 @@ def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
     Columns: u_spatial_m, u_planar_m (deepest strips), spatial_m, planar_m (penetration along the normal, negative where
     planar detection finds no contact), missed_m (spatial less planar overlap along the normal), shift_m (error of the
     longitudinal position), bound_m (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law).
-    Errors are NaN where the deepest strips are further apart than ``same_patch`` (m) and belong to different patches.
+    Errors are NaN if the distance of the deepest strips exceeds ``same_patch`` (m): they belong to different patches.
     """
     modulus = contact_modulus(**MATERIAL)
     out = np.empty((len(shifts) * len(yaws), 12))

@@ -1,6 +1,6 @@
 """Figures of computing time: growth with size, and time of an evaluation by stage.
 
-They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
+Data are the tables of :mod:`study.cost`. Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 """
 
 from matplotlib.figure import Figure

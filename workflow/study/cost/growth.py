@@ -147,7 +147,7 @@ def over_scenes(title, source, overrides, *, counts, threads, passes):
 
 
 def identical(run, other):
-    """Whether two runs have the same status and equal numbers in all channels, bit by bit."""
+    """Whether two runs have the same status and bitwise identical numbers in all channels."""
     if run.status != other.status or run.groups.keys() != other.groups.keys():
         return False
     pairs = [(run.groups[g][c], other.groups[g][c]) for g in run.groups for c in run.groups[g]]
