@@ -17,17 +17,18 @@ from wrcore.wheels.surrogate_patch import _pressed
 from wrcore.wheels.table.lookup import APART, DISK, FAR, SADDLE, _at_ellipse, lobe_end, log_depth_of
 
 LIMITS = APART, FAR, SADDLE
-"""Limits of `lobe_end` at which overlaps are one patch, those of `wrcore.wheels.surrogate_force`."""
+"""Limits of `lobe_end` below which several overlaps form one contact patch; `wrcore.wheels.surrogate_force` uses the
+same limits."""
 
 FLANGE, FIELD = -0.058, 0.050
 """Range of the wheel profile in which first contact is searched, m."""
 
 _TOUCH_STEPS = 1200
-"""Steps of that search: 0.09 mm, the height of a crown is then right to 0.01 um."""
+"""Number of steps of the search for first contact. A step of 0.09 mm gives the height of a crown within 0.01 µm."""
 
 PLACE, OVERLAPS, LOAD, LOG_A, LOG_B, P_MAX = range(6)
-"""Columns of `Found.numbers`: place on the wheel profile (m), number of overlaps, and the contact of a parabolic
-overlap with the same scales: load (N), ln of the semi-axes (over 1 m), largest pressure (Pa)."""
+"""Columns of `Found.numbers`: position on the wheel profile (m) and number of overlaps. The other columns describe the
+contact of a parabolic overlap with the same scales: load (N), ln of the semi-axes over 1 m, maximum pressure (Pa)."""
 
 
 @jit(allocates=False)
@@ -36,14 +37,14 @@ def first_touch(geometry, y, ex, ey, ez):
     pose, least = make_pose(1.0, y, 0.0, ex, ey, ez, True), 1.0
     for k in range(_TOUCH_STEPS + 1):
         gap = gap_at(geometry, pose, FLANGE + (FIELD - FLANGE) * k / _TOUCH_STEPS)[0]
-        if gap < 0.9:  # beyond the profiles it is 1
+        if gap < 0.9:  # outside the profiles `gap_at` returns a gap of 1
             least = min(least, gap)
     return -least
 
 
 @jit(allocates=False)
 def find_described(model, position, rows, row, sums, strips, corrections, zeros, numbers, descriptors, shapes):
-    """Fill ``numbers``, ``descriptors`` and ``shapes`` of the patches at a position; returns how many there are."""
+    """Fill ``numbers``, ``descriptors`` and ``shapes`` of the patches at a position; return the number of patches."""
     geometry, n, first = model.geometry, 0, 0
     y, z, ex, ey, ez = position[0], position[1], position[2], position[3], position[4]
     pose = make_pose(1.0, y, z, ex, ey, ez, True)
@@ -71,8 +72,10 @@ def find_described(model, position, rows, row, sums, strips, corrections, zeros,
 
 @jit(allocates=False)
 def fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
-    """Fill creep forces of the creep table ``base`` (n, 3) and places in the disk (n, 2), as
-    :func:`wrcore.wheels.surrogate_patch.roll_patch` has them, for ``velocities`` (n, 6)."""
+    """Fill ``base`` (n, 3) with creep forces of the creep table and ``disk`` (n, 2) with positions in the unit disk.
+
+    Both belong to ``velocities`` (n, 6) and have the normalisation of
+    :func:`wrcore.wheels.surrogate_force.roll_patch`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
     unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)

@@ -1,7 +1,7 @@
 """Random pairs of a wheel and a rail, on which the surrogate is trained.
 
-Wheels are the named ones, cones and cylinders with and without a flange, and worn shapes of these. Rails are all named
-heads at any inclination, arcs, and worn or ground shapes of these. A pair depends on the random generator alone.
+Wheels are the named profiles, cones and cylinders with and without a flange, and worn shapes of these. Rails are all
+named heads at any inclination, arcs, and worn or ground shapes of these. A pair depends only on the random generator.
 """
 
 from pathlib import Path
@@ -21,7 +21,7 @@ class NamedPair(NamedTuple):
     wheel: str
     rail: str
     inclination: float | None
-    """None: the rail's file is in track position."""
+    """Inclination of the rail, such as 1/40; None if the rail's file already contains the inclined profile."""
 
 
 TEST_PAIRS = (
@@ -35,47 +35,47 @@ TEST_PAIRS = (
     NamedPair("S1002", "54E1", 1 / 40),
     NamedPair("worn_high_mileage.prw", "UIC60-MBench", 1 / 40),
 )
-"""Pairs on which the network is tested, and which its training must not contain. File names are those of the test bank
-of CONTACT (measured profiles); they are not part of the project."""
+"""Pairs on which the network is tested. The training data must not contain them. File names are those of the test bank
+of CONTACT (measured profiles), which is not part of the project."""
 
 WHEELS, RAILS = (
     tuple(row["name"] for row in list_profiles() if row["kind"] == kind and ":" not in row["name"])
     for kind in ("wheel", "rail")
 )
-"""Named profiles that have no parameter."""
+"""Names of the wheel and rail profiles that have no parameter."""
 
 RADII = 0.2, 0.65
 """Range of the rolling radius, m."""
 
 MOST_INCLINATION = 0.065
-"""Largest inclination of a rail; 1/20 is the largest in use."""
+"""Maximum inclination of a random rail. The maximum in use is 1/20."""
 
 _SPACING = 1e-4
-"""Distance of the points of a worn profile, m."""
+"""Distance between the points of a worn profile, m."""
 
 _HALF_DISTANCES = 0.4, 0.85
-"""Range of the distance of the tape circle from the wheelset's centre, m: from narrow to broad gauge."""
+"""Range of the distance between tape circle and wheelset centre, m: from narrow to broad gauge."""
 
 _CLEARANCE = 0.75 - 0.5 * 1.435
-"""Tape circle to gauge line in standard gauge, m."""
+"""Distance from the tape circle to the gauge line in standard gauge, m."""
 
 
 class Pair(NamedTuple):
-    """A wheel on its rail and a text that says how it was made."""
+    """A wheel on its rail, and a text that describes how both profiles were generated."""
 
     on_rail: WheelOnRail
     name: str
 
 
 class Measured(NamedTuple):
-    """Measured profiles (`ProfileCurve`) that random pairs may start from."""
+    """Measured profiles (`ProfileCurve`) from which random pairs may be generated."""
 
     wheels: tuple = ()
     rails: tuple = ()
 
 
 def read_measured(folder):
-    """`Measured` profiles of a folder: wheels are *.whl and *.prw, rails *.ban, *.prr and *.mpt, in any case."""
+    """Read the `Measured` profiles of a folder: wheels *.whl and *.prw, rails *.ban, *.prr and *.mpt, in any case."""
     refused = {name.lower() for pair in TEST_PAIRS for name in (pair.wheel, pair.rail) if "." in name}
     found = {"wheel": [], "rail": []}
     kinds = {".whl": "wheel", ".prw": "wheel", ".ban": "rail", ".prr": "rail", ".mpt": "rail"}
@@ -90,13 +90,14 @@ def read_measured(folder):
 
 
 def smooth_step(x):
-    """Smooth step from 0 to 1 over x from 0 to 1, with continuous curvature."""
+    """Return a step from 0 to 1 over x from 0 to 1, with continuous curvature."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
 def waves(random, u, amplitude, length):
-    """Gaussian random function over ``u`` with this standard deviation (m) and correlation length (m)."""
+    """Return a Gaussian random function of ``u`` with standard deviation ``amplitude`` and correlation length
+    ``length``, both m."""
     nodes = np.arange(u[0] - 4.0 * length, u[-1] + 4.0 * length, length / 3.0)
     kernel = np.exp(-0.5 * ((u[:, None] - nodes) / length) ** 2)
     values = kernel @ random.normal(size=len(nodes))
@@ -104,17 +105,17 @@ def waves(random, u, amplitude, length):
 
 
 def hump(u, depth, place, width, power=2):
-    """Bell of this depth (m), place and width (m); a larger power makes it flat."""
+    """Return a bell-shaped function of ``u`` with depth, position and width in m. A larger power flattens its top."""
     return depth * np.exp(-(np.abs((u - place) / width) ** power))
 
 
 def log_uniform(random, low, high):
-    """Random number between two bounds whose logarithm is uniform."""
+    """Return a random number between two bounds; its logarithm is uniformly distributed."""
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 def wheel_base(random, measured):
-    """Wheel (`ProfileCurve`) before wear, and its name."""
+    """Return a random wheel (`ProfileCurve`) before wear, and its name."""
     kind = random.random()
     if measured.wheels and kind > 0.75:
         wheel = measured.wheels[random.integers(len(measured.wheels))]
@@ -130,13 +131,13 @@ def wheel_base(random, measured):
 
 
 def _points(curve, low, high):
-    """Equally spaced points (u, f) of a curve between two bounds, m."""
+    """Return equally spaced points (u, f) of a curve between two bounds, m."""
     u = np.arange(max(low, curve.u[0]), min(high, curve.u[-1]), _SPACING)
     return u, curve(u)
 
 
 def _with_cone(wheel, slope):
-    """A wheel with a conical or cylindrical tread behind its flange root."""
+    """Return a wheel whose tread outside the flange root is replaced by a cone or cylinder."""
     u, f = _points(wheel, -0.060, 0.055)
     share = smooth_step((u + 0.026) / 0.016)
     cone = np.interp(-0.012, u, f) + slope * (u + 0.012)
@@ -145,12 +146,12 @@ def _with_cone(wheel, slope):
 
 
 def worn_wheel(random, wheel, name):
-    """A wheel after random wear, and its name; in some cases it is left as it is."""
+    """Return a wheel after random wear, and its name; 15 % of the wheels are unchanged."""
     if random.random() < 0.15:
         return wheel, name
     u, f = _points(wheel, -0.060, 0.055)
     has_flange = wheel(np.array([-0.035]))[0] < -2e-3
-    if random.random() < 0.5:  # power 2: hollow; 4: flat
+    if random.random() < 0.5:  # power 2: rounded hollow; power 4: hollow with a flat bottom
         depth = 3e-3 * random.random() ** 2
         width = random.uniform(6e-3, 22e-3)
         f = f + hump(u, depth, random.normal(0.0, 6e-3), width, random.choice([2, 2, 4]))
@@ -177,7 +178,7 @@ def worn_wheel(random, wheel, name):
 
 
 def rail_base(random, measured):
-    """Rail (`ProfileCurve`) before wear, its name and its inclination (None where it has none)."""
+    """Return a random rail (`ProfileCurve`) before wear, its name, and its inclination or None."""
     kind = random.random()
     if measured.rails and kind > 0.85:
         rail = measured.rails[random.integers(len(measured.rails))]
@@ -193,10 +194,10 @@ def rail_base(random, measured):
 
 
 def worn_rail(random, rail, name, wheel, shift):
-    """A rail after random wear or grinding, and its name; in some cases it is left as it is.
+    """Return a rail after random wear or grinding, and its name; a quarter of the rails are unchanged.
 
-    ``shift``: position of the wheel's tape circle over the rail, m. Wear is on the gauge side (u < 0) or, on a rail
-    that was turned, on the other side."""
+    ``shift`` is the lateral position of the wheel's tape circle relative to the rail, m. Wear is on the gauge side
+    (u < 0) or, for a rail that was turned round in the track, on the field side."""
     if random.random() < 0.25:
         return rail, name
     u, new = _points(rail, -0.1, 0.1)
@@ -225,14 +226,14 @@ def worn_rail(random, rail, name, wheel, shift):
 
 
 def _smoothed(values, width):
-    """Values at the points of a profile averaged over a bell of this width, m."""
+    """Return values at the points of a profile, averaged with a Gaussian kernel of this standard deviation (m)."""
     n = int(4.0 * width / _SPACING)
     kernel = np.exp(-0.5 * (np.arange(-n, n + 1) * _SPACING / width) ** 2)
     return np.convolve(np.pad(values, n, mode="edge"), kernel / kernel.sum(), "valid")
 
 
 def _ground(random, u, f):
-    """Rail with facets of 3 to 8 mm, their edges rounded over a millimetre."""
+    """Return the heights of a ground rail: facets 3 to 8 mm wide, with edges rounded over about 1 mm."""
     edges = np.cumsum(random.uniform(3e-3, 8e-3, 30)) - 0.03
     edges = edges[edges < 0.03]
     inside = (u > edges[0]) & (u < edges[-1])
@@ -241,7 +242,7 @@ def _ground(random, u, f):
 
 
 def _towards_wheel(random, u, f, wheel, shift):
-    """Height to add to a rail so that it has taken part of the form of its wheel, at most 3 mm."""
+    """Return the height to add to a rail so that it is partly worn to the shape of its wheel, at most 3 mm."""
     there = u - shift - random.normal(0.0, 3e-3)
     inside = (there > wheel.u[0]) & (there < wheel.u[-1])
     fit = inside & (u > -0.028) & (u < 0.014)
@@ -254,12 +255,12 @@ def _towards_wheel(random, u, f, wheel, shift):
 
 
 def _one_pair(random, measured):
-    """A random `Pair`, or None where it is a test pair."""
+    """Return a random `Pair`, or None if it is a test pair."""
     wheel, wheel_name = worn_wheel(random, *wheel_base(random, measured))
     rail, rail_name, inclination = rail_base(random, measured)
     half = 0.75 if random.random() < 0.6 else random.uniform(*_HALF_DISTANCES)
     gauge = rail.gauge_offset()
-    if not gauge < 0.05:  # an arc has no gauge corner: its crown lies near the tape circle
+    if not gauge < 0.05:  # an arc has no gauge corner; its crown is placed near the tape circle
         gauge = _CLEARANCE
     distance = half - _CLEARANCE + gauge + (random.normal(0.0, 2e-3) if random.random() < 0.6 else 0.0)
     new = rail_name
@@ -282,18 +283,18 @@ def is_test_pair(wheel, rail, inclination):
 
 
 def random_pair(random, measured=None):
-    """A random `Pair`, never a test pair. Pairs whose shapes are refused are drawn again.
+    """Return a random `Pair` that is no test pair. A pair with invalid profiles is replaced by a new random pair.
 
     Parameters
     ----------
     random : numpy.random.Generator
     measured : Measured, optional
-        Profiles that a part of the wheels and rails starts from.
+        Profiles from which some of the wheels and rails are generated.
 
     Raises
     ------
     InputError
-        If 50 pairs in a row are refused.
+        If 50 successive pairs are test pairs or have invalid profiles.
     """
     reason = None
     for _ in range(50):

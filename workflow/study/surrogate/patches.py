@@ -2,8 +2,8 @@
 
     python -m study.surrogate.patches FOLDER --count 100000 --seed 1
 
-writes shards FOLDER/patches-00000.npz and so on. A shard depends on the settings and its number alone. A run that was
-stopped continues where it is run again; several runs with --part 1/2 and --part 2/2 share the work. A larger --count
+writes the shards FOLDER/patches-00000.npz and so on. A shard depends only on the settings and on its number. To
+continue a stopped run, start it again. Several runs with --part 1/2 and --part 2/2 share the work. A larger --count
 adds shards.
 """
 
@@ -34,48 +34,49 @@ from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
 from wrcore.errors import InputError
 
 PAIR_PATCHES = 60
-"""Patches of each pair of profiles that are solved."""
+"""Number of patches solved for each pair of profiles."""
 
 UNSOLVED_PATCHES = 600
-"""Patches of each pair where they are not solved: then the positions of a pair cost most of the time."""
+"""Number of patches per pair if they are not solved. The random positions then take most of the time."""
 
 SHARD_PATCHES = 400
-"""Patches of a shard: some 10 s of one processor core."""
+"""Minimum number of patches in a shard. A shard takes about 10 s on one processor core."""
 
 LEAST_DRAWN = 12
-"""Patches that a pair must have at its random positions to be used."""
+"""Minimum number of patches at the random positions of a pair; pairs with fewer patches are rejected."""
 
 
 SCORED_POSITIONS, SCORED_PATCHES = 300, 100
-"""Random positions of a candidate, and the most patches at them, by which its distance is judged."""
+"""Number of random positions, and maximum number of patches, from which the distance of a candidate is computed."""
 
 
 class Sampling(NamedTuple):
-    """Settings on which the content of a shard depends."""
+    """Settings that determine the content of a shard."""
 
     seed: int
     shard_patches: int = SHARD_PATCHES
     candidates: int = 1
-    """Pairs that are drawn for each pair that is kept, the one farthest from the data that there is."""
+    """Number of random pairs of which one is kept: the pair with the largest distance from the existing data."""
     is_solved: bool = True
-    """False: descriptors without the exact solution, for training with a teacher."""
+    """Whether patches are solved exactly. If False, a shard has only descriptors, for training with a teacher."""
     measured: object = None
-    """`study.surrogate.pairs.Measured`, or None."""
+    """Measured profiles (`study.surrogate.pairs.Measured`), or None."""
     reference: np.ndarray = np.zeros((0, 38))
-    """(n, N_DESCRIPTORS): descriptors from which distances count, beside those of the same shard."""
+    """(n, N_DESCRIPTORS): descriptors to which distances are computed, in addition to those of the same shard."""
 
 
 def scaled_inputs(descriptors):
-    """Descriptors (n, N_DESCRIPTORS) shifted, scaled and compressed as the network of the package does."""
+    """Return descriptors (n, N_DESCRIPTORS), shifted, scaled and compressed like inputs of the package's network."""
     surrogate = load_surrogate()
     x = (np.asarray(descriptors, float) - surrogate.median) * surrogate.per_scale
     return x / (1.0 + x * x) ** 0.25
 
 
 def distances(descriptors, others):
-    """Distance (n,) of each row of scaled inputs to the nearest of ``others``; infinite where there are none.
+    """Return the distance (n,) from each row of scaled inputs to the nearest row of ``others``; infinite if that is
+    empty.
 
-    In 38 dimensions a search tree saves nothing."""
+    All distances are computed, because a search tree saves no time in 38 dimensions."""
     if not len(others):
         return np.full(len(descriptors), np.inf)
     squares = (descriptors**2).sum(1)[:, None] + (others**2).sum(1) - 2.0 * descriptors @ others.T
@@ -83,7 +84,7 @@ def distances(descriptors, others):
 
 
 class _Candidate(NamedTuple):
-    """A pair with its friction and the patches at its random positions."""
+    """A pair, its coefficient of friction, and the patches at its random positions."""
 
     pair: object
     exact: ExactPatches
@@ -91,7 +92,7 @@ class _Candidate(NamedTuple):
 
 
 def _draw_candidate(random, sampling, positions=POSITIONS):
-    """A `_Candidate` that has enough patches at so many random positions."""
+    """Return a random `_Candidate` that has enough patches at the given number of random positions."""
     while True:
         pair = random_pair(random, sampling.measured)
         exact = ExactPatches(pair.on_rail, random_friction(random))
@@ -101,8 +102,9 @@ def _draw_candidate(random, sampling, positions=POSITIONS):
 
 
 def _keep_farthest(random, sampling, known):
-    """Of some candidates the one whose patches are farthest from ``known`` scaled inputs, by their median distance, and
-    this distance."""
+    """Return the candidate with the largest median distance from ``known`` scaled inputs, and this distance.
+
+    With only one candidate the distance is not computed (NaN)."""
     if sampling.candidates == 1:
         return _draw_candidate(random, sampling), np.nan
     best, farthest = None, -1.0
@@ -117,7 +119,7 @@ def _keep_farthest(random, sampling, known):
 
 
 def _solved(random, exact, found, is_solved):
-    """Arrays of one patch by name; None where it has no solution in the range of the training."""
+    """Return the arrays of one patch by name, or None if it has no solution in the range of the training."""
     geometry, points = exact.model.geometry, random_points(random)
     row = {
         "descriptors": found.descriptors,
@@ -138,7 +140,9 @@ def _solved(random, exact, found, is_solved):
 
 
 def pair_patches(random, candidate, sampling, number):
-    """Rows (dict) of the patches of a pair, twins one after the other, and how many had no solution."""
+    """Return rows (dict) of the patches of a pair, and the number of patches or twins without a solution.
+
+    The two patches of a pair of twins are successive rows."""
     exact, rows, failed = candidate.exact, [], 0
     count = PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES
     n = int(round(0.5 * TWINS * count))
@@ -156,7 +160,7 @@ def pair_patches(random, candidate, sampling, number):
 
 
 def make_shard(number, sampling):
-    """Arrays of a shard by name. The pair's number is 1000 times that of the shard plus its place in it."""
+    """Return the arrays of a shard by name. A pair's number is 1000 times the shard's number plus the pair's index."""
     random, rows, names, far, failed = np.random.default_rng([sampling.seed, number]), [], [], [], 0
     known = scaled_inputs(sampling.reference)
     while len(rows) < sampling.shard_patches:
@@ -173,7 +177,7 @@ def make_shard(number, sampling):
 
 
 def write_shards(folder, count, sampling, part=(1, 1), settings=None, report=print):
-    """Write the shards of ``count`` patches that are not there; ``part`` (k, n): every n-th one from the k-th on."""
+    """Write the missing shards of ``count`` patches. A ``part`` (k, n) selects every n-th shard from the k-th on."""
     shards.keep_settings(folder, settings or {"seed": sampling.seed, "shard_patches": sampling.shard_patches})
     total = -(-count // sampling.shard_patches)
     mine = [k for k in range(total) if k % part[1] == part[0] - 1]
@@ -193,7 +197,7 @@ def write_shards(folder, count, sampling, part=(1, 1), settings=None, report=pri
 
 
 def _part(text):
-    """(k, n) of a text like 1/2."""
+    """Return the two numbers (k, n) of a text like 1/2."""
     k, _, n = text.partition("/")
     if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
         raise argparse.ArgumentTypeError(f"expected two numbers such as 1/2, got {text}")
@@ -220,7 +224,7 @@ def _options():
 
 
 def main():
-    """Run the command."""
+    """Run the command that writes shards of training data."""
     parser, asked = _options()
     settings = {"wrcore": wrcore.__version__, "seed": asked.seed, "shard_patches": asked.shard,
                 "candidates": asked.candidates, "is_solved": not asked.unsolved, "points": POINTS,

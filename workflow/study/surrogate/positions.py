@@ -1,4 +1,4 @@
-"""Random positions of a wheel over its rail, and the choice of the patches to solve."""
+"""Random positions of a wheel over its rail, and the selection of the patches to solve."""
 
 import math
 
@@ -15,51 +15,53 @@ FRICTIONS = 0.03, 0.8
 """Range of the coefficient of friction."""
 
 MOST_ANGLE = 1.35
-"""Largest contact angle, rad."""
+"""Maximum contact angle, rad."""
 
 SPECIAL = 0.5
-"""Share of a pair's patches that have several overlaps or a double shape, where it has such patches. As some pairs
-have none, this makes about a fifth of all."""
+"""Maximum share of a pair's selected patches that have several overlaps or a double shape. Some pairs have no such
+patches, therefore they are about a fifth of all patches."""
 
 TWINS = 0.4
-"""Share of a pair's patches that are twins. Without twins linear critical speeds have an error of 1.4 m/s, with them
-0.5 m/s (mean of six pairs)."""
+"""Share of a pair's patches that are twins. The error of linear critical speeds is 1.4 m/s without twins and 0.5 m/s
+with them (mean of six pairs)."""
 
 POSITIONS = 2000
-"""Positions that are drawn for each pair: many more than are kept, so that several overlaps and flanks are among them.
-They cost a third of the time."""
+"""Number of random positions for each pair. Few of them are selected; the large number ensures patches with several
+overlaps and patches on flanks. The positions take a third of the time."""
 
 _ANGLES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.1])
-"""Edges of the classes of contact angle over which patches are drawn evenly, rad."""
+"""Limits of the classes of contact angle, rad. Patches are selected evenly from the classes."""
 
 _STEEP = 6
-"""First class of flanks (0.7 rad), whose patches are drawn twice as often: no twins are among them."""
+"""Index of the first class of flanks (from 0.7 rad). Their patches get twice the weight, because no twins are selected
+on flanks."""
 
 _DOUBLE = 1.8
-"""Value of <e^4> below which a shape is called double; a parabolic overlap has 2.33 and two equal peaks 1."""
+"""Value of <e^4> below which the shape of a patch is double. A parabolic overlap has 2.33, two equal peaks have 1."""
 
 _KURTOSIS = 18
 """Index of <e^4> in the descriptors."""
 
 _TWIN_STEPS = 2.5e-5, 2.5e-4
-"""Range of the distance of twins across the track, m."""
+"""Range of the lateral distance between twins, m."""
 
 _TWIN_LOADS = 0.3, 3.0
-"""Ratio of the loads of twins."""
+"""Range of the ratio between the loads of twins."""
 
 
 def random_friction(random):
-    """Coefficient of friction: 0.3 in every third pair, else over the whole range."""
+    """Return a random coefficient of friction: 0.3 for about a third of the pairs, otherwise from the whole range."""
     return 0.3 if random.random() < 0.35 else log_uniform(random, *FRICTIONS)
 
 
 def axle_of(yaw, slope):
-    """Direction of an axle with these x and z components."""
+    """Return the unit vector (x, y, z) along an axle with these x and z components."""
     return yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope
 
 
 def is_wanted(exact, found):
-    """Whether a patch (`Found`) is in the range of the training; its load is that of the parabolic overlap."""
+    """Whether a patch (`Found`) is in the range of the training. The load is estimated by that of the parabolic
+    overlap."""
     low, high = LOADS
     is_in_range = low < found.numbers[LOAD] < 1.1 * high and abs(found.shape.angle) < MOST_ANGLE
     return is_in_range and exact.is_inside(found)
@@ -71,7 +73,7 @@ def is_special(found):
 
 
 def draw_positions(random, exact: ExactPatches, count=POSITIONS):
-    """List of patches (`Found`) at random positions of the wheelset."""
+    """Return the list of patches (`Found`) at random positions of the wheelset."""
     half, drawn = exact.model.geometry.half_distance, []
     aside = exact.model.geometry.rail_distance - half
     for _ in range(count):
@@ -85,7 +87,7 @@ def draw_positions(random, exact: ExactPatches, count=POSITIONS):
 
 
 def choose(random, drawn, count):
-    """``count`` of the patches, evenly over contact angle; a share `SPECIAL` of several overlaps or double shape."""
+    """Select ``count`` patches evenly over contact angle; a share `SPECIAL` has several overlaps or a double shape."""
     special = np.array([is_special(one) for one in drawn])
     n = min(int(round(SPECIAL * count)), int(special.sum()))
     chosen = _evenly(random, drawn, np.flatnonzero(special), n)
@@ -94,7 +96,7 @@ def choose(random, drawn, count):
 
 
 def _evenly(random, drawn, among, count):
-    """Indices of at most ``count`` patches out of ``among``, evenly over classes of contact angle."""
+    """Return indices of at most ``count`` patches out of ``among``, evenly over classes of contact angle."""
     count = min(count, len(among))
     if count == 0:
         return []
@@ -105,8 +107,9 @@ def _evenly(random, drawn, among, count):
 
 
 def twin_of(random, exact, found):
-    """A patch at most 250 um aside of another one, with nearly the same load, and the distance (m); None if there is
-    none."""
+    """Return a twin of a patch and their lateral distance (m), or None if there is no such patch.
+
+    A twin is at most 250 µm away laterally, and its load is 0.3 to 3 times that of the first patch."""
     y, z, ex, _, ez = found.position
     step = log_uniform(random, *_TWIN_STEPS) * random.choice([-1.0, 1.0])
     turn = 5e-5 * random.normal() if random.random() < 0.3 else 0.0
@@ -121,7 +124,9 @@ def twin_of(random, exact, found):
 
 
 def choose_twins(random, exact, drawn, count):
-    """``count`` pairs (patch, twin, distance): on treads and roots, and a quarter about several overlaps."""
+    """Return up to ``count`` triples (patch, twin, distance in m) on treads and flange roots.
+
+    In a quarter of the trials the first patch has several overlaps, if there are such patches."""
     low = [one for one in drawn if abs(one.shape.angle) < 0.7]
     births = [one for one in low if one.numbers[OVERLAPS] > 1]
     found = []

@@ -1,4 +1,4 @@
-"""Shards of training data: files of a folder, each written whole or not at all."""
+"""Shards of training data: files of a folder that are never incomplete."""
 
 import hashlib
 import json
@@ -13,12 +13,12 @@ SETTINGS = "settings.json"
 
 
 def path_of(folder, number):
-    """Path of a shard."""
+    """Return the path of the shard with this number."""
     return Path(folder) / f"patches-{number:05d}.npz"
 
 
 def write(path, arrays):
-    """Write arrays by name to an npz file: under a temporary name first, so that a file is never incomplete."""
+    """Write arrays by name to an npz file, first under a temporary name so that the file is never incomplete."""
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
     try:
@@ -29,13 +29,13 @@ def write(path, arrays):
 
 
 def read(path):
-    """Arrays of an npz file by name."""
+    """Return the arrays of an npz file by name."""
     with np.load(path, allow_pickle=False) as file:
         return {name: file[name] for name in file.files}
 
 
 def found_in(folder):
-    """Paths of the shards of a folder, sorted; InputError if there are none."""
+    """Return the sorted paths of the shards of a folder; InputError if there are none."""
     paths = sorted(Path(folder).glob("patches-*.npz"))
     if not paths:
         raise InputError(str(folder), "shards", "expected files patches-*.npz, as study.surrogate.patches writes them")
@@ -43,7 +43,7 @@ def found_in(folder):
 
 
 def digest_of(paths):
-    """SHA-256 of the content of files, as text."""
+    """Return the SHA-256 of the content of files, as text."""
     digest = hashlib.sha256()
     for path in paths:
         digest.update(Path(path).read_bytes())
@@ -51,7 +51,7 @@ def digest_of(paths):
 
 
 def keep_settings(folder, settings):
-    """Write the settings of a folder; InputError where it has shards of other settings."""
+    """Write the settings of a folder; InputError if the folder has shards with other settings."""
     path = Path(folder) / SETTINGS
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists():

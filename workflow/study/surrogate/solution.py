@@ -1,13 +1,13 @@
-"""Contact patches at given positions: descriptors, exact solution, and what the network is to learn of it.
+"""Contact patches at given positions: descriptors, exact solution, and the targets of the network.
 
-The targets are defined by the product's own kernels, so that a network that meets them gives exact contact in
+The targets are computed with the kernels of wrcore. A network that reproduces them reproduces exact contact in
 `wrcore.wheels.surrogate_force`:
 
-* Corrections (N_CORRECTIONS): ln N, ln a, ln b and ln p_max less those of the parabolic overlap; place along and
-  across the patch over l, contact angle and height over l less those of the parabolas of `PatchShape` at the exact
-  place across the patch and the exact semi-axis b.
-* Remainder: creep force of the exact solution less that of the creep table at the exact ellipse, load, place and angle,
-  at `POINTS` creepages of a wheel that rolls; over friction times N, and times c for the moment.
+* Corrections (N_CORRECTIONS): ln N, ln a, ln b and ln p_max minus their values for the parabolic overlap; position
+  along and across the patch over l, contact angle and height over l. The last ones are relative to the parabolas of
+  `PatchShape` at the exact position across the patch and the exact semi-axis b.
+* Remainder: creep force of the exact solution minus that of the creep table at the exact ellipse, load, position and
+  angle, at `POINTS` creepages of a rolling wheel. Forces are divided by friction times N, moments also by c.
 """
 
 import math
@@ -46,61 +46,64 @@ from wrcore.wheels.table.node import (
 )
 
 N_RANDOM = 12
-"""Rolling solutions at random creepages, beside five near rest."""
+"""Number of rolling solutions at random creepages, in addition to five near rest."""
 
 POINTS = len(AT_REST) + N_RANDOM
-"""Rolling solutions of each patch, the ones near rest first."""
+"""Number of rolling solutions of each patch; those near rest come first."""
 
 MOST_CREEPAGE = 0.5
-"""Largest creepage of a rolling solution: small patches with high friction would need more to slide than a wheel that
-is locked."""
+"""Maximum creepage of a rolling solution. Without this bound, small patches with high friction would need creepages
+above that of a locked wheel to slide."""
 
 MOST_FOUND = 4
-"""Patches of one position that are kept."""
+"""Maximum number of patches at one position."""
 
 END_MARGIN = 2e-4
-"""Distance of the end of a profile from a patch, m. Patches that it cuts off have pressures ten times those of an
-ellipse."""
+"""Minimum distance between a patch and the end of a profile, m. Patches that are cut off by the end of a profile have
+ten times the pressure of an ellipse."""
 
 
 class Found(NamedTuple):
-    """A patch at a position of the wheelset, before it is solved."""
+    """A contact patch at a position of the wheelset, without its solution."""
 
     position: np.ndarray
     """(5,): y and z of the wheelset's centre (m) and the direction of its axle."""
     numbers: np.ndarray
-    """(6,): `PLACE` and the columns after it."""
+    """(6,): columns `PLACE` to `P_MAX` of `study.surrogate.finding`."""
     descriptors: np.ndarray
-    """(N_DESCRIPTORS,)."""
+    """(N_DESCRIPTORS,): inputs of the network before scaling."""
     shape: PatchShape
 
 
 class Solved(NamedTuple):
-    """Exact contact of a patch and the targets of the network."""
+    """Exact solution of a contact patch and the targets of the network."""
 
     load: float
     """Normal force, N."""
     angle: float
     """Contact angle, rad."""
     corrections: np.ndarray
-    """(N_CORRECTIONS,)."""
+    """(N_CORRECTIONS,): targets for the corrections."""
     exact: np.ndarray
     base: np.ndarray
-    """(POINTS, 3): exact creep force and moment and those of the creep table, over friction times N, and times c."""
+    """(POINTS, 3): creep forces and moment of the exact solution (``exact``) and of the creep table (``base``); forces
+    over friction times N, moments over friction times N times c."""
     disk: np.ndarray
-    """(POINTS, 2): place of the creepages in the disk of the force modes."""
+    """(POINTS, 2): position of the creepages in the disk of the force modes."""
     velocities: np.ndarray
-    """(POINTS, 6): velocity of the wheelset over that along the track, linear and angular."""
+    """(POINTS, 6): linear and angular velocity of the wheelset, divided by its velocity along the track."""
 
 
 def random_points(random, count=N_RANDOM):
-    """Creepages (count, 2) over those of saturation, uniform over the disk of the force modes up to 0.965."""
+    """Return random creepages (count, 2), divided by those of saturation.
+
+    They are uniformly distributed over the disk of the force modes up to the radius 0.965."""
     r, angle = 0.965 * np.sqrt(random.random(count)), 2.0 * math.pi * random.random(count)
     return 2.0 * DISK * np.stack([r * np.cos(angle), r * np.sin(angle)], 1) / (1.0 - r[:, None] ** 2)
 
 
 def unbounded(x, bound):
-    """Number that `wrcore.wheels.surrogate_patch.bounded` maps to x; beyond 0.95 of the bound to that."""
+    """Return the inverse of `wrcore.wheels.surrogate_force.bounded` at x; |x| is limited to 0.95 of the bound."""
     half = 0.5 * bound
     over = min(abs(x), 0.95 * bound) - half
     if not over > 0.0:
@@ -110,7 +113,9 @@ def unbounded(x, bound):
 
 @lru_cache(maxsize=1)
 def _template():
-    """`ContactModel` of exact contact at the resolution ``middle`` with the creep table, of any pair."""
+    """Return the `ContactModel` of exact contact at the resolution ``middle`` with the creep table.
+
+    Its geometry and its friction are replaced for each pair."""
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
     exact, table = (LoadedWheels(pair.geometry, name, "middle").contact for name in ("exact", "surrogate"))
     return without_wheels(exact, law=LAWS["table"], creep=table.creep, strips=with_tables(exact.strips), damping=1.0)
@@ -118,12 +123,12 @@ def _template():
 
 @lru_cache(maxsize=1)
 def _works():
-    """Scratch arrays of two solutions, with fewer and with more strips."""
+    """Return the work arrays of two solutions, with fewer and with more strips."""
     return [Handle(strip_work(_template().strips, 1, SLIPS)) for _ in range(2)]
 
 
 class ExactPatches:
-    """Finds the patches of a `WheelOnRail` and solves them with exact contact at one coefficient of friction."""
+    """Exact contact of a `WheelOnRail` at one coefficient of friction: search and solution of its contact patches."""
 
     def __init__(self, pair, friction):
         self.pair = pair
@@ -138,11 +143,11 @@ class ExactPatches:
         self._descriptors = np.zeros((MOST_FOUND, N_DESCRIPTORS))
 
     def touch(self, y, axle):
-        """Height of the wheelset's centre at first contact, m."""
+        """Return the height of the wheelset's centre at first contact, m."""
         return first_touch(self.model.geometry, y, *axle)
 
     def find(self, y, z, axle):
-        """List of the patches (`Found`) at a position."""
+        """Return the list of the patches (`Found`) at a position of the wheelset."""
         position, zeros = np.array([y, z, *axle]), np.zeros(N_CORRECTIONS)
         n = find_described(
             self._handle, position, self._rows, self._row, self._sums, self._strips, zeros, zeros, self._numbers,
@@ -154,7 +159,7 @@ class ExactPatches:
         ]
 
     def is_inside(self, found):
-        """Whether a patch is away from the ends of both profiles, where its overlap is cut off."""
+        """Whether a patch is far enough from the ends of both profiles, which would cut off its overlap."""
         half_width = 3.0 * found.shape.sigma * math.cos(found.shape.angle)  # a parabolic overlap ends at 2.65 sigma
         wheel, rail, margin = self.pair.wheel.u, self.pair.rail.u, END_MARGIN + half_width
         return (
@@ -163,8 +168,9 @@ class ExactPatches:
         )
 
     def _press(self, found):
-        """Sums of `press_lobe`, and the solutions (weight, frame, work) of which it is the mean; None if there is
-        none."""
+        """Return the sums of `press_lobe` and the list of solutions (weight, frame, work) of which they are the mean.
+
+        Return None if the strips have no solution."""
         y, z, *axle = found.position
         free = np.array([1.0, 0.0, 0.0, *(np.array(axle) / self.model.geometry.rolling_radius)])
         sums, each, pressed = np.zeros(SUMS), np.zeros(SUMS), []
@@ -182,7 +188,7 @@ class ExactPatches:
         return sums, pressed
 
     def _wrenches(self, found, pressed, velocities):
-        """Wrenches of friction (n, 6) about the wheelset's centre for velocities (n, 6)."""
+        """Return the wrenches of friction (n, 6) about the wheelset's centre for velocities (n, 6)."""
         y, z, *axle = found.position
         total = np.zeros((len(velocities), 6))
         for weight, frame, work in pressed:
@@ -195,8 +201,9 @@ class ExactPatches:
         return total
 
     def solve(self, found, points):
-        """`Solved` at rest and at creepages ``points`` (N_RANDOM, 2) over those of saturation; None where the strips
-        find no solution."""
+        """Return the solution (`Solved`) near rest and at ``points`` (N_RANDOM, 2), or None if the strips have none.
+
+        The ``points`` are creepages divided by those of saturation."""
         pressed = self._press(found)
         if pressed is None:
             return None
@@ -215,8 +222,9 @@ class ExactPatches:
         return solved if all(np.isfinite(part).all() for part in solved) else None
 
     def _velocities(self, found, slip, angle, log_a, log_b, limit, points):
-        """Velocities (n, 6), over that along the track, of a wheel that rolls with these creepages over those of
-        saturation at the ``slip``."""
+        """Return the velocities (n, 6) of a rolling wheel, divided by its velocity along the track.
+
+        The ``points`` are creepages, divided by those of saturation, at the position ``slip`` of the contact."""
         geometry, axle, numbers = self.model.geometry, found.position[2:], np.zeros(NUMBERS)
         numbers[columns.ANGLE] = angle
         numbers[columns.PLACE_X : columns.PLACE_Z + 1] = (
@@ -227,13 +235,14 @@ class ExactPatches:
         unit = self.model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)
         creepages = np.clip(points / (kalker * unit), -MOST_CREEPAGE, MOST_CREEPAGE)
         velocities = np.empty((len(points), 6))
-        # `slide` adds creepages to a wheel whose speed without them is 1; they are meant over the wheel's speed
+        # `slide` refers creepages to the speed of the free wheel (1), ``points`` to the speed with creepage
         slide(free, tuple(slip), math.cos(angle), creepages / (1.0 - creepages[:, :1]), velocities)
         return velocities / velocities[:, :1]
 
     def _corrections(self, found, slip, angle, b, numbers):
-        """Corrections (N_CORRECTIONS,) with which `surrogate_force` finds this place and angle and these ``numbers``:
-        ln of N, a, b and p_max."""
+        """Return the corrections (N_CORRECTIONS,) with which `surrogate_force` reproduces the exact solution.
+
+        The solution is the position ``slip``, the contact angle, b, and ``numbers``: ln of N, a, b and p_max."""
         shape, base, y = found.shape, found.numbers, found.position[0]
         lateral = slip[1] + y - self.model.geometry.rail_distance - shape.lateral
         e = lateral / (shape.sigma * math.cos(shape.angle))

@@ -2,10 +2,10 @@
 
     python -m study.surrogate.training FOLDER --minutes 26 --out weights.npz
 
-needs JAX and optax (pip install "wrcore[surrogate]"). The state is kept in weights.checkpoint.npz; a run that was
-stopped continues from there where it is run again. With --start the training begins with the weights of a trained
-network, a lower --rate does then. With --teacher the targets are the outputs of other weights, for a smaller network;
-the patches then need no solution (--unsolved of study.surrogate.patches).
+needs JAX and optax (pip install "wrcore[surrogate]"). The state is kept in weights.checkpoint.npz. To continue a
+stopped run from there, start it again. With --start the training begins with the weights of a trained network; a lower
+--rate is then sufficient. With --teacher the targets are the outputs of other weights, for a smaller network. The
+patches then need no solution (--unsolved of study.surrogate.patches).
 """
 
 import argparse
@@ -28,17 +28,17 @@ from wrcore.contact.surrogate.network import N_CORRECTIONS
 from wrcore.errors import InputError
 
 CHUNK = 20
-"""Steps that are compiled as one call."""
+"""Number of training steps in one compiled call."""
 
 OTHER_POINTS = 5
-"""Creepages of a patch in a step, beside those near rest: drawn anew for each call. All of them would cost 2.4 times
-the time."""
+"""Number of creepages of a patch in a step, in addition to those near rest. They are selected at random for each call;
+a step with all creepages takes 2.4 times as long."""
 
 LEAST_RATE = 1e-5
-"""Learning rate at the end."""
+"""Learning rate at the end of the training."""
 
 _WARM_UP = 5
-"""Calls over which the learning rate rises."""
+"""Number of calls over which the learning rate rises at the start."""
 
 _ADAM = optax.scale_by_adam(b1=0.9, b2=0.99)
 
@@ -47,22 +47,22 @@ _KEEP_EVERY = 30.0
 
 
 class Settings(NamedTuple):
-    """Settings on which the weights depend, beside the data and the time."""
+    """Settings that determine the weights, together with the data and the time."""
 
     width: int = 128
     modes: int = 48
     seed: int = 0
     batch: int = 512
     twins: int = 96
-    """Pairs of neighbours in a batch."""
+    """Number of pairs of twins in a batch."""
     rate: float = 3e-3
     minutes: float = 26.0
     steps: int = 0
-    """Calls of `CHUNK` steps in place of the minutes, so that the weights are the same again; 0: by time."""
+    """Number of calls of `CHUNK` steps, for reproducible weights; 0: the training ends after ``minutes``."""
 
 
 class State(NamedTuple):
-    """Parameters and state of the optimiser after so many calls and so much time (s)."""
+    """Parameters and state of the optimiser, with the number of calls and the time (s) until this state."""
 
     parameters: dict
     optimiser: tuple
@@ -71,7 +71,7 @@ class State(NamedTuple):
 
 
 def new_state(settings, start=None):
-    """`State` before the first step: random, or with the weights ``start`` (arrays by name) of a trained network."""
+    """Return the `State` before the first step: random, or with ``start``, weights (arrays by name) of a network."""
     parameters = new_parameters(settings.seed, settings.width, settings.modes)
     if start is not None:
         parameters = parameters_of(start)
@@ -79,7 +79,7 @@ def new_state(settings, start=None):
 
 
 def parameters_of(weights):
-    """Parameters of the arrays of weights.npz by name; the inverse of `weights_of`."""
+    """Return the parameters from the arrays of weights.npz by name. The inverse function is `weights_of`."""
     return {
         part: [[jax.numpy.asarray(weights[f"{prefix}{kind}_{k}"]) for kind in ("weights", "biases")]
                for k in range(1, count + 1)]
@@ -89,7 +89,7 @@ def parameters_of(weights):
 
 @jax.jit
 def _call(parameters, optimiser, rate, batches):
-    """`CHUNK` steps over the first axis of `Batch` arrays."""
+    """Compute `CHUNK` training steps over the first axis of `Batch` arrays."""
 
     def one(carry, batch):
         parameters, optimiser = carry
@@ -102,7 +102,7 @@ def _call(parameters, optimiser, rate, batches):
 
 
 def draw_batches(data, settings, call):
-    """`Batch` with `CHUNK` batches, by the seed and the number of the call alone."""
+    """Return a `Batch` with `CHUNK` random batches, which depend only on the seed and on the number of the call."""
     random = np.random.default_rng([settings.seed, call])
     n = settings.twins if len(data.twins.step) else 0
     some = random.integers(len(data.training.inputs), size=(CHUNK, settings.batch - 2 * n))
@@ -120,7 +120,7 @@ def draw_batches(data, settings, call):
 
 
 def _rate(settings, state):
-    """Learning rate, and the share of the training that is done."""
+    """Return the learning rate and the completed share of the training."""
     if settings.steps:
         share = state.calls / settings.steps
     else:
@@ -130,7 +130,7 @@ def _rate(settings, state):
 
 
 def advance(state, data, settings):
-    """`State` after one more call, and the mean loss."""
+    """Return the `State` after another call, and the mean loss."""
     begin = time.monotonic()
     rate, _ = _rate(settings, state)
     parameters, optimiser, value = _call(*state[:2], rate, draw_batches(data, settings, state.calls))
@@ -139,20 +139,20 @@ def advance(state, data, settings):
 
 
 def digest_of(data, settings, others):
-    """SHA-256 of data, settings and the digests of other weights that count, as text."""
+    """Return the SHA-256 of the data, the settings and the digest ``others`` of the weights used, as text."""
     text = json.dumps([data.digest, settings._asdict(), others, wrcore.__version__])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def keep(path, state, digest):
-    """Write a checkpoint."""
+    """Write the `State` to a checkpoint file."""
     leaves = jax.tree.leaves((state.parameters, state.optimiser))
     arrays = {f"leaf_{k}": np.array(leaf) for k, leaf in enumerate(leaves)}
     shards.write(path, arrays | {"calls": state.calls, "seconds": state.seconds, "digest": np.array(digest)})
 
 
 def resume(path, settings, digest, start=None):
-    """`State` of a checkpoint, or a new one where there is none; InputError where it is of another training."""
+    """Return the `State` of a checkpoint, or a new one if there is no file; InputError if its digest differs."""
     state = new_state(settings, start)
     if not Path(path).exists():
         return state
@@ -167,7 +167,7 @@ def resume(path, settings, digest, start=None):
 
 
 def weights_of(parameters, scaling, digest):
-    """Arrays of weights.npz by name, and the digest."""
+    """Return the arrays of weights.npz by name, with the digest among them."""
     arrays = dict(scaling._asdict())
     arrays["corrections"] = (OUTPUT_SCALE * CORRECTION_ERRORS).astype(np.float32)
     arrays["force_scales"] = FORCE_ERRORS.astype(np.float32)
@@ -179,8 +179,10 @@ def weights_of(parameters, scaling, digest):
 
 
 def errors_of(parameters, patches):
-    """One line with errors as median / 95 % / 99 %, in %: of N, a, b, p_max, of the place across over l, of the creep
-    force over friction times N, of the moment, and of the slopes at rest; and the loss."""
+    """Return one line of text with errors relative to the targets and the loss, on given patches.
+
+    Errors are median / 95 % / 99 %, in %: of N, a, b and p_max, of the position across the patch over l, of the creep
+    force over friction times N, of the moment, and of the derivatives of the force at rest."""
     parts = [
         predict(parameters, patches.inputs[first : first + 2048], patches.disk[first : first + 2048])
         for first in range(0, len(patches.inputs), 2048)
@@ -197,20 +199,20 @@ def errors_of(parameters, patches):
 
 
 def train(data, settings, out, others="", start=None, report=print):
-    """Train until the time is over, and write the weights to ``out``; returns the last `State`.
+    """Train for the time or the steps of the settings, write the weights to ``out``, and return the last `State`.
 
     Parameters
     ----------
     data : TrainingData
     settings : Settings
     out : pathlib.Path
-        File of the weights; the checkpoint stands beside it.
+        File of the weights; the checkpoint is written to the same folder.
     others : str, optional
-        Digest of the weights that the targets or the first parameters are from.
+        Digest of the weights of the teacher or of the start.
     start : dict, optional
-        Arrays by name of weights with which the training begins; ``settings`` have their sizes.
+        Weights (arrays by name) with which the training begins; ``settings`` must have their sizes.
     report : callable, optional
-        Gets one line at a time.
+        Function that is called with one line of text at a time.
     """
     digest = digest_of(data, settings, others)
     checkpoint = Path(out).with_suffix(".checkpoint.npz")
@@ -266,7 +268,7 @@ def _options():
 
 
 def main():
-    """Run the command."""
+    """Run the command that trains the network."""
     parser, asked = _options()
     settings = Settings(**{name: getattr(asked, name) for name in Settings._fields if hasattr(asked, name)})
     try:

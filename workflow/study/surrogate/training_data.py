@@ -9,51 +9,52 @@ from wrcore.contact.surrogate.network import N_CORRECTIONS, force_modes
 from wrcore.errors import InputError
 
 HELD_BACK = 20
-"""One pair of so many is held back to judge the network."""
+"""Reciprocal of the share of pairs that are held back to measure the errors of the network."""
 
 CORRECTION_ERRORS = np.array([1e-3, 2e-3, 2e-3, 8e-3, 5e-4, 1e-3, 3e-4, 2e-4])
-"""Errors of the corrections that count as one: of ln N, ln a, ln b, ln p_max, of the place along and across over l, of
-the angle (rad) and of the height over l. A loss with place and angle at eight times these gave errors of 1 to 3 m/s in
-linear critical speeds."""
+"""Scales of the errors of the corrections: ln N, ln a, ln b, ln p_max, position along and across the patch over l,
+contact angle (rad), and height over l. With eight times these scales for position and angle, linear critical speeds
+have errors of 1 to 3 m/s."""
 
 FORCE_ERRORS = np.array([0.005, 0.005, 0.01])
-"""Errors of the creep force (over friction times N) and of the moment (times c) that count as one."""
+"""Scales of the errors of the creep force (over friction times N) and of the moment (over friction times N times c)."""
 
 OUTPUT_SCALE = 5.0
-"""The network's outputs are the corrections over so many of the errors that count as one."""
+"""Factor of the corrections: corrections divided by `CORRECTION_ERRORS` are this factor times the network's outputs."""
 
 BIRTH_WEIGHT = 0.1
-"""Weight of twins about several overlaps; at 1 they rule the loss, and the force on treads becomes 20 % worse."""
+"""Weight of twins with several overlaps. At 1 they dominate the loss, and the error of the force on treads rises by
+20 %."""
 
 FALLBACK_SCALE = 0.15
-"""Share of the standard deviation below which the scale of a descriptor does not fall: some are 0 in most patches."""
+"""Minimum scale of a descriptor, relative to its standard deviation. Some descriptors are 0 in most patches."""
 
 
 class Scaling(NamedTuple):
-    """Shift, scale and range of the descriptors, (N_DESCRIPTORS,) each."""
+    """Shift (``median``), scale and range of the descriptors, each with shape (N_DESCRIPTORS,)."""
 
     median: np.ndarray
     scale: np.ndarray
     least: np.ndarray
     greatest: np.ndarray
-    """Range of 99.8 % of the training data."""
+    """Upper end of the range that contains 99.8 % of the training data; ``least`` is its lower end."""
 
     def compressed(self, descriptors):
-        """Inputs of the network, float32."""
+        """Return the inputs of the network (float32) from descriptors."""
         x = (descriptors - self.median) / self.scale
         return (x / (1.0 + x * x) ** 0.25).astype(np.float32)
 
 
 class Patches(NamedTuple):
-    """Arrays over patches, in the units of the loss."""
+    """Inputs and targets of patches, scaled for the loss."""
 
     inputs: np.ndarray
     corrections: np.ndarray
-    """(n, N_CORRECTIONS) over `CORRECTION_ERRORS`."""
+    """(n, N_CORRECTIONS): corrections divided by `CORRECTION_ERRORS`."""
     forces: np.ndarray
-    """(n, POINTS, 3): remainder over `FORCE_ERRORS`."""
+    """(n, POINTS, 3): remainder divided by `FORCE_ERRORS`."""
     disk: np.ndarray
-    """(n, POINTS, 2)."""
+    """(n, POINTS, 2): positions of the creepages in the disk of the force modes."""
 
 
 class Twins(NamedTuple):
@@ -66,7 +67,7 @@ class Twins(NamedTuple):
 
 
 class TrainingData(NamedTuple):
-    """What is trained on, and what is held back."""
+    """Training data, and the data that are held back to measure the errors."""
 
     scaling: Scaling
     training: Patches
@@ -77,7 +78,7 @@ class TrainingData(NamedTuple):
 
 
 def scaling_of(descriptors):
-    """`Scaling` of training descriptors (n, N_DESCRIPTORS)."""
+    """Return the `Scaling` of training descriptors (n, N_DESCRIPTORS)."""
     low, median, high = np.percentile(descriptors, [5, 50, 95], axis=0)
     scale = np.maximum((high - low) / 3.3, FALLBACK_SCALE * np.std(descriptors, axis=0))
     least, greatest = np.percentile(descriptors, [0.1, 99.9], axis=0)
@@ -86,18 +87,18 @@ def scaling_of(descriptors):
 
 
 def known_scaling(weights):
-    """`Scaling` of the weights of a trained network."""
+    """Return the `Scaling` of the weights of a trained network."""
     return Scaling(*(weights[name] for name in Scaling._fields))
 
 
 def _joint_scaling(start, own):
-    """`Scaling` with the shift and scale of trained weights, and the range of theirs and other data."""
+    """Return the `Scaling` with shift and scale of trained weights; its range covers theirs and that of ``own``."""
     known = known_scaling(start)
     return known._replace(least=np.minimum(known.least, own.least), greatest=np.maximum(known.greatest, own.greatest))
 
 
 def run_teacher(teacher, descriptors):
-    """Corrections (n, N_CORRECTIONS) and coefficients of the force modes (n, modes) of trained weights."""
+    """Return corrections (n, N_CORRECTIONS) and coefficients of the force modes (n, modes) from trained weights."""
     x = known_scaling(teacher).compressed(descriptors).astype(float)
     for k in (1, 2, 3, 4):
         x = x @ teacher[f"weights_{k}"].astype(float) + teacher[f"biases_{k}"]
@@ -106,7 +107,7 @@ def run_teacher(teacher, descriptors):
 
 
 def taught(teacher, descriptors, disk):
-    """Corrections and remainders (n, POINTS, 3) by trained weights."""
+    """Return corrections (n, N_CORRECTIONS) and remainders (n, POINTS, 3) from trained weights."""
     corrections, coefficients = run_teacher(teacher, descriptors)
     remainders = np.empty((*disk.shape[:2], 3), np.float32)
     for first in range(0, len(disk), 2000):
@@ -117,7 +118,7 @@ def taught(teacher, descriptors, disk):
 
 
 def _joined(folders):
-    """Arrays of all shards by name, with numbers of pairs that differ between folders, and the digest."""
+    """Return the arrays of all shards by name, and the digest. Numbers of pairs are made unique over the folders."""
     paths, parts = [], []
     for place, folder in enumerate(folders):
         for path in shards.found_in(folder):
@@ -130,11 +131,11 @@ def _joined(folders):
 
 
 _OF_SHARD = "names", "distances", "failed"
-"""Arrays of a shard that are not over patches."""
+"""Names of the arrays of a shard whose first axis is not the patches."""
 
 
 def _random_disk(n):
-    """Places (n, POINTS, 2) of creepages for patches that are not solved."""
+    """Return positions (n, POINTS, 2) of creepages in the disk, for patches that are not solved."""
     from study.surrogate.solution import AT_REST, N_RANDOM, random_points
     from wrcore.wheels.table.lookup import DISK
 
@@ -145,10 +146,10 @@ def _random_disk(n):
 
 
 def load(folders, teacher=None, start=None):
-    """`TrainingData` of folders with shards.
+    """Return the `TrainingData` of folders with shards.
 
     With a ``teacher`` (arrays of weights by name) the targets are its outputs, and the shards may be unsolved. With
-    weights to ``start`` with, inputs are shifted and scaled as theirs."""
+    weights ``start``, the inputs are shifted and scaled like those of these weights."""
     rows, digest = _joined(folders)
     descriptors, disk = rows["descriptors"].astype(float), rows.get("disk")
     if teacher is not None:
@@ -171,7 +172,7 @@ def load(folders, teacher=None, start=None):
 
 
 def is_held_back(pairs):
-    """Whether patches are of pairs that are held back: the same ones whatever else there is."""
+    """Whether the pair of each patch is held back. The result depends only on the number of the pair."""
     known = np.unique(pairs)
     held = [pair for pair in known if np.random.default_rng(int(pair)).random() < 1.0 / HELD_BACK]
     return np.isin(pairs, held or known[-1:])
@@ -183,7 +184,7 @@ def _part(whole, scaling, some):
 
 
 def _twins(rows, training):
-    """`Twins` among the patches ``training``."""
+    """Return the `Twins` among the patches with the indices ``training``."""
     place = np.full(len(rows["pair"]), -1)
     place[training] = np.arange(len(training))
     first = np.flatnonzero((rows["twin"][:-1] == 0) & (rows["twin"][1:] == 1))
