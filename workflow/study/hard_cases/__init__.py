@@ -1,1 +1,1 @@
-"""What every hard case must keep, and where the methods break."""
+"""Hard cases: invariants that every simulation must satisfy, and the limits of the methods."""

@@ -1,8 +1,8 @@
-"""Hard cases: what each one must keep is stated first, then it is run, and a table says what came of it.
+"""Common parts of the hard cases: preparation of a vehicle, simulation, invariants, and rows of the table.
 
-A case runs one vehicle with one detection and one integrator and is judged by invariants. Each is a number with a limit
-that follows from mechanics, from the law in use or from the integrator's tolerance; its source is part of the table.
-The families of cases are the modules ``analysis_hard_<family>``.
+A case simulates one vehicle with one detection and one integrator, and checks invariants. Each invariant is a number
+with a limit that follows from mechanics, from the law in use or from the integrator's tolerance. The table contains the
+source of the limit. The families of cases are the other modules of this package.
 """
 
 import math
@@ -30,17 +30,19 @@ COLUMNS = (
     "steps", "rejected", "collapses", "smallest_step_s", "wall_s", "out_of_range", "invariant", "value", "unit",
     "relation", "limit", "source", "passed", "known_limit",
 )  # fmt: skip
-"""Columns of the table."""
+"""Columns of the table of hard cases."""
 
 NORM_LIMIT = 1e-6
-"""Largest departure of a Euler parameters' norm from 1 that a run may show: at the scenes' relative tolerance of 1e-4 a
-rotation is then still exact to a hundredth of it."""
+"""Maximum deviation of the norm of Euler parameters from 1. The error of a rotation is then a hundredth of the scenes'
+relative tolerance of 1e-4."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One invariant of a case: ``limit`` is the largest value that passes (the smallest if ``least``), ``source`` where
-    it comes from, ``known_limit`` why the models in use cannot pass, where that is known.
+    """One invariant of a case.
+
+    ``limit`` is the maximum value that passes (the minimum if ``least``), and ``source`` is the origin of the limit.
+    ``known_limit`` is the reason for which the models in use cannot pass, if it is known.
     """
 
     invariant: str
@@ -53,14 +55,16 @@ class Check:
 
     @property
     def passed(self):
-        """False for a value that is no number."""
+        """Whether the value is within the limit; False for NaN."""
         return bool(self.value >= self.limit if self.least else self.value <= self.limit)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A vehicle, ready to run from ``state``: arrays of the model may be changed between parts of a run, ``label``
-    holds the columns vehicle, detection and integrator of the table.
+    """A vehicle that is ready to run from ``state``.
+
+    Arrays of the model may be changed between parts of a run. ``label`` has the columns vehicle, detection and
+    integrator of the table.
     """
 
     scene: object
@@ -70,16 +74,17 @@ class Setting:
 
     @property
     def control(self):
-        """Keyword arguments for `integrate`."""
+        """Return the keyword arguments for `integrate`."""
         chosen = self.scene.data["integration"]
         names = ("method", "rtol", "atol", "step", "longest_step")
         return {name: chosen[name] for name in names} | {"derailed_y": DERAILED_Y}
 
 
 def prepare(vehicles, name, changes=(), **parts):
-    """A vehicle of the study as a `Setting`, with further changes to the scene. By name, ``vehicles`` hold ``scene``,
-    ``set`` (changes to it) and ``table`` (path of a creep table; left out: the default one). ``parts`` are attributes
-    of the scene to be replaced, such as ``wheel`` or ``track``.
+    """Return a vehicle of the study as a `Setting`, with further changes to the scene.
+
+    For each name, ``vehicles`` contains ``scene``, ``set`` (changes to the scene) and ``table`` (path of a creep table;
+    the default one if omitted). ``parts`` are attributes of the scene to be replaced, such as ``wheel`` or ``track``.
     """
     entry = vehicles[name]
     chosen = {**entry.get("set", {}), **dict(changes)}
@@ -94,8 +99,10 @@ def prepare(vehicles, name, changes=(), **parts):
 
 
 def with_forces(setting, body, markers):
-    """The same with constant forces on one body at markers (n, 3), relative to the body's centre (m): the setting, and
-    a view (n, 3) of the forces (N, axes of the moving frame), zero until they are set.
+    """Return a copy of a setting with constant forces on one body, and a view (n, 3) of these forces.
+
+    Forces act at the markers (n, 3), relative to the body's centre (m). They are in N along the axes of the moving
+    frame, and zero until the caller sets them.
     """
     elements, markers = setting.model.elements, np.atleast_2d(np.asarray(markers, float))
     rows = np.zeros((len(markers), elements.springs.shape[1]))
@@ -112,14 +119,16 @@ def with_forces(setting, body, markers):
 
 
 def run(setting, duration, rate=200.0, begin=0.0, **control):
-    """Integrate a setting; keyword arguments change those of `Setting.control`."""
+    """Integrate a setting; keyword arguments replace those of `Setting.control`."""
     times = output_times(begin, duration, rate)
     return integrate(setting.model, setting.state, times, **{**setting.control, **control})
 
 
 def run_in_parts(setting, duration, rate, part, change, **control):
-    """Integrate for a duration (s) at an output rate (1/s), part (s) by part: ``change`` takes the time and the state
-    at which each begins, may change the model's arrays, and ends the run by returning True.
+    """Integrate for a duration (s) at an output rate (1/s) in successive parts of ``part`` seconds.
+
+    Before each part ``change`` is called with time and state. It may change the model's arrays, and it ends the run if
+    it returns True.
     """
     done, at, state = [], 0.0, setting.state
     for index in range(math.ceil(duration / part - 1e-9)):
@@ -133,7 +142,7 @@ def run_in_parts(setting, duration, rate, part, change, **control):
 
 
 def joined(parts):
-    """One trajectory of several that follow each other."""
+    """Join successive trajectories to one."""
     counted = (
         "steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "out_of_range", "wall_s", "collapses",
     )  # fmt: skip
@@ -148,7 +157,10 @@ def joined(parts):
 
 
 def contacts(model, times, states):
-    """Patches of all wheels along a trajectory, shape (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), NaN if absent."""
+    """Return the contact patches of all wheels along a trajectory; NaN for absent patches.
+
+    The shape is (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS).
+    """
     shape = (len(times), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches, bounds, rates = np.full(shape, np.nan), np.full(shape[:3], np.nan), np.empty(states.shape)
     states = np.ascontiguousarray(states)
@@ -157,16 +169,21 @@ def contacts(model, times, states):
 
 
 def wheel_forces(patches):
-    """Vertical (downwards) and lateral (to the left) force of each wheel on its rail, N, shape (n, wheelsets, 2)."""
+    """Return the force of each wheel on its rail, vertical (downwards) and lateral (to the left).
+
+    Both have the shape (n, wheelsets, 2) and the unit N.
+    """
     normal, lateral, angle = (patches[..., k] for k in (reduction.NORMAL, reduction.FY, reduction.ANGLE))
     vertical = np.nansum(normal * np.cos(angle) + lateral * np.sin(angle), axis=-1)
     return vertical, -np.nansum(lateral * np.cos(angle) - normal * np.sin(angle), axis=-1)
 
 
 def impulse_error(setting, trajectory, patches):
-    """Impulse of the rails less that of the load and less the momentum gained by all bodies, of the load's, over a
-    trajectory sampled closely enough for the forces (patches from :func:`contacts`). The load is the weight and the
-    preloads of elements to the moving frame, which have no vertical stiffness.
+    """Return the error of the vertical momentum balance over a trajectory, relative to the impulse of the load.
+
+    The error is the impulse of the rails minus that of the load and minus the momentum gained by all bodies. The load
+    is the weight plus the preloads of elements to the moving frame, which have no vertical stiffness. ``patches`` are
+    from :func:`contacts`; the sampling must resolve the forces.
     """
     bodies, elements = setting.model.bodies, setting.model.elements
     preloads = [
@@ -183,7 +200,7 @@ def impulse_error(setting, trajectory, patches):
 
 
 def sound(setting, trajectory):
-    """Checks that hold for every run: numbers, unit Euler parameters, no tension."""
+    """Return the checks for every run: finite states, no tensile normal force, Euler parameters with norm 1."""
     states = trajectory.states[:, : STATE_SIZE * len(setting.model.bodies.mass)]
     parameters = states.reshape(len(states), -1, STATE_SIZE)[:, :, 3:7]
     patches = contacts(setting.model, trajectory.t, trajectory.states)
@@ -197,8 +214,10 @@ def sound(setting, trajectory):
 
 
 def rows(family, case, condition, setting, trajectory, checks, expected="completed", known_limit=""):
-    """Rows of the table for one run: one per check; ``expected`` is the status that counts as survived, and
-    ``known_limit`` a reason for which a run may end otherwise.
+    """Return the rows of the table for one run, one per check.
+
+    ``expected`` is a status that is accepted as survived, in addition to "completed". ``known_limit`` is a reason for
+    which a run may end otherwise.
     """
     used = trajectory.method
     label = setting.label | {"integrator": used if setting.control["step"] == 0.0 else f"{used}, fixed step"}
@@ -222,13 +241,13 @@ def rows(family, case, condition, setting, trajectory, checks, expected="complet
 
 
 def computed(family, case, condition, label, checks, wall=np.nan):
-    """Rows for a case that runs no vehicle in time, such as a sweep of poses."""
+    """Return the rows for a case without time integration, such as a sweep of positions."""
     cost = {"outcome": "survived", "status": "completed", "reason": "", "wall_s": wall}
     return [_row(family, case, condition, label | cost, check) for check in checks]
 
 
 def refused(family, case, condition, label, attempt):
-    """Row for a case that must be refused; ``attempt`` is called and has to raise InputError."""
+    """Return the row for a case that must be refused; the case passes if ``attempt()`` raises InputError."""
     try:
         attempt()
         cost = {"outcome": "failed", "status": "accepted", "reason": "expected a refusal"}
@@ -250,5 +269,5 @@ def _row(family, case, condition, known, check):
 
 
 def table(rows_of_cases):
-    """The table of the study from the rows of all cases."""
+    """Return the table of the study (`COLUMNS`) from the rows of all cases."""
     return pd.DataFrame(rows_of_cases, columns=COLUMNS)

@@ -31,16 +31,18 @@ from wrcore.integrate.tolerances import LENGTH
 from wrcore.vehicle.description import GRAVITY
 
 SMOOTH = 2.0
-"""A step of the force larger than so many times the steepest smooth change is a jump."""
+"""Maximum ratio of a force step to the steepest smooth change; larger steps are jumps."""
 
 RATE_SHARE = 0.6
-"""Part of the lag of a slow push that may be left at half its rate: all of what is no hysteresis halves."""
+"""Maximum width of the loop at half the rate of a slow push, relative to that at the full rate. A lag that depends on
+the rate halves; hysteresis does not."""
 
 RESTITUTION_ERROR = 0.01
-"""Of the restitution at the scenes' relative tolerance of 1e-4."""
+"""Accepted error of the restitution at the scenes' relative tolerance of 1e-4."""
 
 RESOLVED = 1e-3
-"""Part of an impact's depth that a step may err by in heights; shallower ones need a smaller ``rtol`` than others."""
+"""Accepted error of the height in a step, relative to the penetration of an impact. Shallow impacts therefore need a
+smaller ``rtol``."""
 
 GAP = 2e-4
 """Gap from which a wheelset is dropped onto the rails, m."""
@@ -48,22 +50,23 @@ GAP = 2e-4
 PLANAR_LOOP = "planar detection has two equilibria of a yawed wheelset where the contact jumps to the flange's root"
 
 CRESTS = {"flat": 0.25, "steep": 2.0}
-"""Largest V^2 kappa over load by unsprung mass on a crest. A quarter of it never unloads a wheel: the curvature sets in
-suddenly at both ends, which doubles its effect at most, and changes by twice its size between. Above 1 wheels leave."""
+"""Maximum of V^2 kappa on a crest, relative to load over unsprung mass. Wheels lift off above 1. At 0.25 they never do:
+the curvature starts suddenly, which at most doubles its effect, and changes by twice its size within the crest."""
 
 IMPULSE_ERROR = 0.01
-"""Of the load's impulse: sampled forces of impacts are integrated to no better than this."""
+"""Accepted error of the impulse, relative to that of the load. It is the accuracy of integrals of sampled impact
+forces."""
 
 CREST_RATE = 2e4
-"""Outputs per second of runs over a crest."""
+"""Output rate of runs over a crest, 1/s."""
 
 
 def restitution(speed, c_e, v0):
-    """Speed after over speed (m/s) before an impact by Eq. (7), without weight; c_e and v0 (m/s) are those of the
-    damping factor.
+    """Return the restitution of an impact by Eq. (7) without weight: speed after over speed (m/s) before the impact.
 
-    With m v v' = -c_d(v') f(d) and any elastic force f that depends on the penetration alone, int v/c_d(v) dv over the
-    approach equals int v/c_d(-v) dv over the separation. For speeds far above v0 that is sqrt(c_e).
+    c_e and v0 (m/s) are parameters of the damping factor. With m v v' = -c_d(v') f(d) and any elastic force f of the
+    penetration, int v/c_d(v) dv over the approach equals int v/c_d(-v) dv over the separation. For speeds far above v0
+    the restitution is sqrt(c_e).
     """
 
     def stored(end, sign):
@@ -74,17 +77,20 @@ def restitution(speed, c_e, v0):
 
 
 def depth(setting, speed):
-    """How deep (m) a wheelset goes in that hits the rails without weight: (5/4 m v^2/K)^(2/5) by Hertz, undamped."""
+    """Return the maximum penetration (m) of an impact at a vertical speed (m/s), without weight and damping.
+
+    By Hertz it is (5/4 m v^2/K)^(2/5).
+    """
     patches = contacts(setting.model, np.zeros(1), setting.state[None, :])
     stiffness = np.nansum(patches[..., reduction.NORMAL] / patches[..., reduction.PENETRATION] ** 1.5)
     return float(1.25 * setting.model.bodies.mass[0] * speed**2 / stiffness) ** 0.4
 
 
 def impacts(vehicles, name, speeds, detections, methods):
-    """A free wheelset that hits the rails at vertical speeds (m/s) without weight, its restitution against that of the
-    damping law: rows of the table, and curve of restitution and expected.
+    """Compare the restitution of a free wheelset, which hits the rails without weight, with that of the damping law.
 
-    Where the study's tolerance is no small part of how deep it goes in, ``rtol`` is made `RESOLVED` of that.
+    The vertical speeds are in m/s. Returns rows of the table, and curve of restitution and expected. For impacts that
+    the study's tolerance does not resolve, ``rtol`` is reduced to `RESOLVED` times the penetration.
     """
     found, curve = [], []
     for detection, method, speed in product(detections, methods, speeds):
@@ -111,9 +117,10 @@ def impacts(vehicles, name, speeds, detections, methods):
 
 
 def drops(vehicles, name, height, duration, detections, methods, tolerances):
-    """A free wheelset that falls from a height (m) onto the rails, bounces and comes to rest within a duration (s) at
-    relative tolerances (the absolute one is a thousandth): it never gets higher than before. Rows of the table, and
-    curve of lift_m (above the static height) over t_s.
+    """Drop a free wheelset from a height (m) onto the rails; no bounce may be higher than the one before.
+
+    The wheelset bounces and comes to rest within a duration (s). ``tolerances`` are relative; the absolute ones are a
+    thousandth of them. Returns rows of the table, and curve of lift_m (above the static height) over t_s.
     """
     found, curve = [], []
     for detection, method, rtol in product(detections, methods, tolerances):
@@ -147,7 +154,7 @@ def drops(vehicles, name, height, duration, detections, methods, tolerances):
 
 
 def crest(length, curvature, begin):
-    """Irregularity of both rails, a hump (1 - cos) of the given length whose top has the given curvature (1/m)."""
+    """Return the irregularity of both rails: a hump (1 - cos) of given length (m) and curvature (1/m) at its top."""
     s = np.arange(0.0, length + 1e-9, 0.02)
     height = curvature * length**2 / (2.0 * np.pi) ** 2 * (1.0 - np.cos(2.0 * np.pi * s / length))
     zero = np.zeros_like(s)
@@ -155,8 +162,9 @@ def crest(length, curvature, begin):
 
 
 def crests(vehicles, speed, length, duration, detections, methods):
-    """Vehicles that run over a hump of a length (m) at a speed (m/s) for a duration (s): wheels take off where V^2
-    kappa exceeds what presses them down, and come back; rows of the table.
+    """Run vehicles over a hump of a length (m) at a speed (m/s) for a duration (s); return rows of the table.
+
+    Wheels must lift off where V^2 kappa exceeds load over unsprung mass, and must return to the rail.
     """
     found = []
     for name, detection, method, kind in product(vehicles, detections, methods, CRESTS):
@@ -176,7 +184,7 @@ def crests(vehicles, speed, length, duration, detections, methods):
 
 
 def _crest_checks(setting, trajectory, share):
-    """Lift-off where it must be and nowhere else, return, and impulse of the rails against momentum of all bodies."""
+    """Return the checks of lift-off, return to the rail, and momentum balance of all bodies."""
     patches = contacts(setting.model, trajectory.t, trajectory.states)
     front = np.all(~np.isfinite(patches[:, 0, ..., reduction.NORMAL]), axis=2)
     away = float(np.mean(np.all(front, axis=1)))
@@ -197,11 +205,14 @@ def _crest_checks(setting, trajectory, share):
 
 
 def pose_sweeps(pairs, load, step, reach, far_step, far):
-    """Static sweeps of pairs (settings of :func:`study.contact.tables.study_pair`) under a load (N per wheel): how far
-    the force steps at constant height (``step``, ``reach``), and whether the way back is the way there at constant load
-    (``far_step``, ``far``), all m.
+    """Compute static lateral sweeps of wheel-rail pairs under a load (N per wheel).
 
-    Rows of the table, and curve of u_wheel_m (left, most loaded patch) and force_N (lateral, both wheels) over y_m.
+    ``pairs`` are settings of :func:`study.contact.tables.study_pair`. A sweep at constant height (``step``, ``reach``)
+    measures jumps of the force. A sweep to ``far`` and back at constant load (``far_step``) must give equal forces in
+    both directions. Lengths are in m.
+
+    Returns rows of the table, and curve of u_wheel_m (left wheel, most loaded patch) and force_N (lateral, both wheels)
+    over y_m.
     """
     found, curve = [], []
     for pair, settings in pairs.items():
@@ -234,7 +245,7 @@ def _there_and_back(far, step):
 
 
 def _at_load(geometry, detection, load, y):
-    """Lateral force and the left wheel's most loaded patch of a wheelset under load at lateral positions."""
+    """Return lateral force and the left wheel's most loaded patch of a wheelset under load at lateral positions (m)."""
     poses = pd.DataFrame({"pose_id": np.arange(len(y)), "y_m": y, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan})
     patches = loaded_poses(poses, geometry, load, "moment", detection=detection)
     lateral = (-patches.N_N * np.sin(patches.contact_angle_rad)).groupby(patches.pose_id).sum()
@@ -244,8 +255,10 @@ def _at_load(geometry, detection, load, y):
 
 
 def slow_push(vehicles, name, largest, durations, detections, methods):
-    """A wheelset pushed to the left by a force up to ``largest`` (N) over its contact jumps and back in two durations
-    (s, the second longer): what is left of the loop at no rate. Rows of the table, and curve of y_m over force_N.
+    """Measure the hysteresis of a wheelset that a slow force pushes to the left over its contact jumps and back.
+
+    The force rises to ``largest`` (N) and falls again within a duration (s). The loop of y over the force is compared
+    for two durations, of which the second is longer. Returns rows of the table, and curve of y_m over force_N.
     """
     found, curve = [], []
     for detection, method in product(detections, methods):
@@ -267,7 +280,10 @@ def slow_push(vehicles, name, largest, durations, detections, methods):
 
 
 def _push_and_return(setting, largest, duration, parts=400):
-    """The first wheelset under a force that rises and falls in small steps, and that force at the output times."""
+    """Return setting, trajectory, and force at the output times for a lateral force that rises and falls in steps.
+
+    The force acts on the first wheelset.
+    """
     setting, force = with_forces(setting, int(setting.model.bodies.wheelsets[0]), np.zeros(3))
     part = duration / parts
 

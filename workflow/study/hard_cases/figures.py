@@ -1,6 +1,7 @@
 """Figures of the hard cases, drawn from the curves of `study.hard_cases.study.run_family`.
 
-Units change here and nowhere before. Planar and spatial detection look as in all other figures.
+Values are converted from SI units only in this module. Planar and spatial detection have the same line styles as in all
+other figures.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ METHODS = {
     "tsit5": ("#0072B2", "o"), "rk45": ("#56B4E9", "s"), "rk4": ("#CC79A7", "v"), "rk23": ("#E69F00", "^"),
     "rodas5": ("#D55E00", "h"), "rodas4": ("#222222", "D"), "rodas4p2": ("#009E73", "X"), "ros34pw2": ("0.55", "P"),
 }  # fmt: skip
-"""Colour (Okabe-Ito; dark to light in grey) and marker of the integrators."""
+"""Colour and marker of each integrator. Colours are from Okabe-Ito and run from dark to light in grey."""
 
 DASHES = ("-", (0, (4, 2)), (0, (1, 1)), "-.")
 
@@ -24,7 +25,7 @@ SHADES = ("#222222", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7")
 
 
 def _groups(curve, *columns):
-    """Parts of a curve (list of dict) by the values of some columns, in their order."""
+    """Group a curve (list of dict) by the values of some columns, in the order of the rows."""
     return pd.DataFrame(curve).groupby(list(columns), sort=False)
 
 
@@ -35,7 +36,7 @@ def _panels(count, width=7.2, height=2.9):
 
 @styled
 def fig_low_speed(curves):
-    """Braking to standstill, and what the smallest speed of creepages changes (family ``low_speed``)."""
+    """Draw braking to standstill, and the influence of the minimum speed for creepages (family ``low_speed``)."""
     figure, (braking, influence) = _panels(2, 7.8)
     rows = pd.DataFrame(curves["braking"])
     rows = rows[(rows["detection"] == "spatial") & (rows["least_speed_m_per_s"] == rows["least_speed_m_per_s"].min())]
@@ -62,8 +63,9 @@ def fig_low_speed(curves):
 
 @styled
 def fig_contact_jumps(curves):
-    """Lateral force and contact point over y under load, and a slow push to the flange and back (family
-    ``contact``).
+    """Draw lateral force and contact point over y under load, and a slow push to the flange and back.
+
+    The family of cases is ``contact``.
     """
     figure, (force, point, push) = _panels(3, 9.0)
     for (pair, detection), part in _groups(curves["pose_sweeps"], "pair", "detection"):
@@ -86,7 +88,7 @@ def fig_contact_jumps(curves):
 
 @styled
 def fig_lift_off(curves):
-    """Restitution over speed against the damping law's, and a drop that bounces (family ``contact``)."""
+    """Draw restitution over speed with that of the damping law, and a drop with bounces (family ``contact``)."""
     figure, (impact, drop) = _panels(2)
     rows = pd.DataFrame(curves["impacts"])
     law = rows.drop_duplicates("speed_m_per_s").sort_values("speed_m_per_s")
@@ -111,7 +113,7 @@ def fig_lift_off(curves):
 
 @styled
 def fig_nadal(curves):
-    """Y/Q at which a wheelset climbs over friction, with Nadal's limit (family ``flange``)."""
+    """Draw Y/Q of a climbing wheelset over the coefficient of friction, with Nadal's limit (family ``flange``)."""
     figure, (axes,) = _panels(1, 4.2, 3.0)
     rows = pd.DataFrame(curves["nadal"])
     limit = rows.drop_duplicates("friction").sort_values("friction")
@@ -126,7 +128,7 @@ def fig_nadal(curves):
 
 @styled
 def fig_stability_map(curves):
-    """Largest stable step over speed: found (markers), of the linearised motion (lines; family ``integration``)."""
+    """Draw the maximum stable step over speed: from runs (markers) and linearised (lines; family ``integration``)."""
     groups = _groups(curves["stability_map"], "vehicle")
     figure, panels = _panels(groups.ngroups, 3.7 * groups.ngroups, 3.1)
     for axes, ((vehicle,), table) in zip(panels, groups, strict=True):
@@ -144,7 +146,10 @@ def fig_stability_map(curves):
 
 @styled
 def fig_tolerances(curves):
-    """Error over the tolerance by integrator, drift and steps over Baumgarte's feedback (family ``integration``)."""
+    """Draw errors over the tolerance, and drift and number of steps over Baumgarte's feedback.
+
+    The family of cases is ``integration``.
+    """
     figure, (errors, drift, steps) = _panels(3, 9.0)
     rows = pd.DataFrame(curves["tolerance_ladder"])
     rows = rows[(rows["vehicle"] == rows["vehicle"].iloc[0]) & (rows["detection"] == rows["detection"].iloc[-1])]
@@ -173,8 +178,9 @@ def fig_tolerances(curves):
 
 @styled
 def fig_sharp_curve(curves):
-    """Lateral force of all wheels on the rails through a transition into a sharp curve, and what Newton's law asks for
-    (family ``track``).
+    """Draw the lateral force of all wheels on the rails in a sharp curve, and the force by Newton's law.
+
+    The vehicle enters the curve through a transition. The family of cases is ``track``.
     """
     figure, (axes,) = _panels(1, 5.2, 3.8)
     rows = pd.DataFrame(curves["curve"])
@@ -197,4 +203,4 @@ FIGURES = {
     "stability_map": ("integration", fig_stability_map), "tolerances": ("integration", fig_tolerances),
     "sharp_curve": ("track", fig_sharp_curve),
 }  # fmt: skip
-"""Family and function of each figure by the name of its file."""
+"""Family of cases and drawing function of each figure, by the name of its file."""

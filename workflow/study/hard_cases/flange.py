@@ -1,4 +1,4 @@
-"""Hard cases on the flange: a wheelset is pushed sideways until it climbs and derails; Nadal's limit."""
+"""Hard cases of flange contact: a lateral force pushes a wheelset until it climbs and derails; Nadal's limit."""
 
 import math
 from itertools import product
@@ -11,46 +11,49 @@ from wrcore.contact.search import reduction
 from wrcore.run.simulation import DERAILED_Y
 
 RATE = 500.0
-"""Outputs per second: 20 mm of track at 10 m/s."""
+"""Output rate, 1/s: one output per 20 mm of track at 10 m/s."""
 
 PART = 0.02
 """Time for which a force is kept constant, s."""
 
 AXLE_BOX = 1.0
-"""Lateral distance of the forces from the wheelset's centre, m. They act in the plane of the rails: forces at the axle
-would lift the other wheel at Y/Q = 0.75/0.46 at the latest, below Nadal's limit of low friction."""
+"""Lateral distance of the forces from the wheelset's centre, m. They act in the plane of the rails. Forces at the axle
+would lift the other wheel at Y/Q = 0.75/0.46 or less, which is below Nadal's limit for low friction."""
 
 SLIDING_MEAN = 2.0
 """Distance over which Y/Q is averaged, m (EN 14363)."""
 
 ON_THE_TIP = 0.04
-"""From this distance off the centre on the flange's tip stands on the rail, m."""
+"""Lateral displacement of the wheelset above which the flange tip is on the rail, m."""
 
 NADAL_FLOOR = 0.97
-"""Least part of Nadal's limit at which a wheel may climb: the mean over 2 m lags behind the rising force."""
+"""Minimum Y/Q of a climbing wheel relative to Nadal's limit. It is below 1 because the mean over 2 m lags behind the
+rising force."""
 
 PLANAR_LIMIT = "planar detection misses the flange contact ahead of the axle's cross-section: the wheel climbs late"
 
 NADAL_CEILING = 1.15
-"""Largest part of it at a large angle of attack: longitudinal slip of the flange takes part of the friction."""
+"""Maximum Y/Q relative to Nadal's limit at a large angle of attack. It is above 1 because longitudinal slip of the
+flange uses part of the friction."""
 
 
 def nadal_limit(friction, angle):
-    """Nadal's limit of Y/Q: (tan g - mu)/(1 + mu tan g) for the steepest contact angle g (rad)."""
+    """Return Nadal's limit of Y/Q: (tan g - mu)/(1 + mu tan g) with the maximum contact angle g (rad)."""
     return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
 
 
 def flange_angle(scene):
-    """Steepest contact angle of a scene's wheel profile on the flange, rad."""
+    """Return the maximum contact angle of a scene's wheel profile on the flange, rad."""
     wheel = scene.wheel
     flank = (wheel.u > wheel.u[np.argmin(wheel.f)]) & (wheel.u < 0.0)  # from the flange's tip to the tape circle
     return float(math.atan(np.max(np.abs(wheel.df[flank]))))
 
 
 def pushed(setting, body, turn, rate, largest, settle):
-    """Setting and trajectory of a wheelset that is turned towards a rail and, after ``settle`` (s), pushed onto it by a
-    force to the left that rises at a rate (N/s) to ``largest`` (N), until it derails; ``turn`` (N) acts ahead on its
-    right and backwards on its left end, in full at half the time to settle.
+    """Return setting and trajectory of a wheelset that is yawed and pushed onto the left rail until it derails.
+
+    Forces ``turn`` (N) act forwards on the right and backwards on the left end; they reach full size at half the time
+    ``settle`` (s). After ``settle`` a force to the left rises at a rate (N/s) to ``largest`` (N).
     """
     low = -setting.scene.vehicle.rolling_radius
     setting, force = with_forces(setting, body, [[0.0, AXLE_BOX, low], [0.0, -AXLE_BOX, low]])
@@ -63,8 +66,10 @@ def pushed(setting, body, turn, rate, largest, settle):
 
 
 def flange_history(setting, trajectory, body):
-    """What the left wheel of a pushed wheelset does over time, shapes (n,): t_s, y_m, yaw_rad, Y_over_Q (sliding mean
-    over 2 m; NaN where the wheel is as good as unloaded), patches, contact_angle_rad (steepest).
+    """Return the history of a pushed wheelset and its left wheel, arrays (n,) by name.
+
+    They are t_s, y_m, yaw_rad, Y_over_Q (sliding mean over 2 m; NaN where the wheel is almost unloaded), patches
+    (number) and contact_angle_rad (maximum).
     """
     k = int(np.flatnonzero(setting.model.bodies.wheelsets == body)[0])
     patches = contacts(setting.model, trajectory.t, trajectory.states)[:, k, 0]
@@ -86,14 +91,17 @@ def flange_history(setting, trajectory, body):
 
 
 def climbing(history):
-    """Largest Y/Q (mean over 2 m) before a wheelset has climbed: up to 8 mm off the centre, where the flange ends."""
+    """Return the maximum Y/Q (mean over 2 m) until the last time at which the displacement is below 8 mm.
+
+    Beyond 8 mm the wheelset has climbed, because the flange ends there.
+    """
     on_flange = history["y_m"] < 0.008
     last = np.flatnonzero(on_flange)[-1] + 1
     return float(np.nanmax(history["Y_over_Q"][:last], initial=0.0))
 
 
 def _recognised(setting, trajectory):
-    """Checks of a derailment: where the run ended."""
+    """Return the checks of a derailment: lateral positions of the wheelsets at the end of the run."""
     places = trajectory.states[:, 1 : STATE_SIZE * len(setting.model.bodies.mass) : STATE_SIZE]
     places = np.abs(places[:, setting.model.bodies.wheelsets])
     return [
@@ -105,8 +113,9 @@ def _recognised(setting, trajectory):
 
 
 def derailments(vehicles, speeds, detections, methods, pushes):
-    """Vehicles whose first wheelset is pushed over the rail at several speeds (m/s), by ``pushes`` of a ``largest``
-    force (N) at a ``rate`` (N/s) by vehicle: rows of the table.
+    """Push the first wheelset of vehicles over the rail at several speeds (m/s); return rows of the table.
+
+    For each vehicle, ``pushes`` contains the ``largest`` force (N) and the ``rate`` (N/s).
     """
     found = []
     for name, speed, detection, method in product(pushes, speeds, detections, methods):
@@ -127,9 +136,10 @@ def derailments(vehicles, speeds, detections, methods, pushes):
 
 
 def nadal(vehicles, name, speed, frictions, detections, turn, push):
-    """Y/Q at which a wheelset with a large angle of attack (``turn``, N, as for :func:`pushed`) climbs at a speed (m/s)
-    under a slowly rising force (``largest``, N, and ``rate``, N/s, of the push), over friction: rows of the table, and
-    curve of Y_over_Q, nadal and yaw_rad when it climbs.
+    """Compute Y/Q at which a wheelset with a large angle of attack climbs, over the coefficient of friction.
+
+    The speed is in m/s, and ``turn`` (N) is that of :func:`pushed`. The ``push`` has the ``largest`` force (N) and the
+    ``rate`` (N/s). Returns rows of the table, and curve of Y_over_Q, nadal, and yaw_rad at climbing.
     """
     found, curve = [], []
     for detection, friction in product(detections, frictions):

@@ -1,4 +1,4 @@
-"""Hard cases of the tangential contact: friction from none to 0.8, its jumps, creep laws out of their usual range."""
+"""Hard cases of tangential contact: friction from 0 to 0.8, sudden changes of friction, creep laws at their limits."""
 
 from itertools import product
 
@@ -11,27 +11,28 @@ from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.scene.description import load_scene
 
 TABLE_ERROR = 0.01
-"""Of a creep force, as a fraction of mu N: the tolerance to which creep tables are built."""
+"""Accepted error of a creep force relative to mu N. It is the tolerance with which creep tables are computed."""
 
 FRICTIONLESS = 1e-9
-"""Friction coefficient that stands for none."""
+"""Coefficient of friction of a frictionless case; exactly 0 is refused."""
 
 STEP = 1e-3
-"""Length over which friction changes, m."""
+"""Length of track over which friction changes, m."""
 
 UNBOUNDED = "linear theory knows no friction limit"
 NO_SPIN_IN_BOUND = "Shen-Hedrick-Elkins and FASTSIM: the power of a large spin may come out wrong"
 
 
 def used_friction(patches, friction):
-    """Largest creep force of all patches over the friction limit; friction by patch, or one for all."""
+    """Return the maximum ratio of creep force to friction limit over all patches; friction by patch or for all."""
     force = np.hypot(patches[..., reduction.FX], patches[..., reduction.FY])
     return float(np.nanmax(force / (friction * patches[..., reduction.NORMAL])))
 
 
 def friction_ladder(vehicles, names, values, laws, duration, detections, unstable=()):
-    """Vehicles released off the centre for a duration (s) at friction coefficients from none to very high, by creep
-    law: rows of the table. The motion of ``unstable`` vehicles grows until they climb: they may end in a derailment.
+    """Release vehicles off the centre for a duration (s) with several coefficients of friction and creep laws.
+
+    Returns rows of the table. The motion of ``unstable`` vehicles grows until they climb, so that they may derail.
     """
     entry = vehicles[names[0]]
     label = {"vehicle": names[0], "detection": "any", "integrator": "any"}
@@ -52,7 +53,7 @@ def friction_ladder(vehicles, names, values, laws, duration, detections, unstabl
 
 
 def frictionless(vehicles, name, duration, detections, methods):
-    """A wheelset without friction: nothing changes its speed ahead and its spin."""
+    """Check that a wheelset without friction keeps its forward speed and its spin; return rows of the table."""
     found = []
     for detection, method in product(detections, methods):
         changes = {"contact.friction": FRICTIONLESS, "contact.detection": detection, "integration.method": method}
@@ -67,7 +68,10 @@ def frictionless(vehicles, name, duration, detections, methods):
 
 
 def friction_step(vehicles, names, values, part, detections, methods):
-    """A track whose friction changes within `STEP` after each part, passed in ``part`` (s): rows of the table."""
+    """Run vehicles over a track with sudden changes of friction; return rows of the table.
+
+    Friction is constant over parts that take ``part`` (s) each, and changes over the length `STEP` between them.
+    """
     found = []
     for name, detection, method in product(names, detections, methods):
         changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.004}
@@ -93,9 +97,11 @@ def friction_step(vehicles, names, values, part, detections, methods):
 
 
 def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
-    """Creep laws of a vehicle's table and material at the ends of their range, flat and slender patches (``ratios``
-    a/b), creepages and spin without bounds (nondimensional ``sizes``, each alone and all together): rows of the table.
-    ``tolerance`` is the change of a force (of mu N) that a change of a/b by a tenth of it may make.
+    """Check creep laws with a vehicle's table and material at the limits of their range; return rows of the table.
+
+    The patches have semi-axes with the ``ratios`` a/b. Creepages and spin have the nondimensional ``sizes``, one at a
+    time and all together. A relative change of a/b by a tenth of ``tolerance`` may change a force by ``tolerance``,
+    relative to mu N.
     """
     found = []
     directions = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])

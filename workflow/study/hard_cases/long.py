@@ -1,4 +1,4 @@
-"""Hard cases over a long time: hunting for an hour, streamed to a file, broken off and taken up again."""
+"""Hard cases over a long time: an hour of hunting, written to a file, interrupted and continued."""
 
 import tracemalloc
 from pathlib import Path
@@ -14,22 +14,26 @@ from wrcore.run.output.files import load_run
 from wrcore.run.streaming import simulate_to
 
 BLOCKS = 16
-"""Blocks that a run is written in."""
+"""Number of blocks in which a run is written to its file."""
 
 PARTS = 10
-"""Parts of a run whose amplitudes are compared; the first one settles."""
+"""Number of parts of a run. The amplitudes of the second and the last part are compared, because the motion settles in
+the first part."""
 
 MEMORY_GROWTH = 1.05
-"""Peak of the memory in the second half of a run over that in the first: blocks are of one size."""
+"""Maximum ratio of the peak memory in the second half of a run to that in the first half. All blocks have the same
+size, so that memory must not grow."""
 
 
 class _BrokenOffError(Exception):
-    """What ends a run half-way, as a crash would."""
+    """Exception that interrupts a run half-way, like a crash."""
 
 
 def hunting(vehicles, name, changes, duration, rate=200.0):
-    """A limit cycle over a long duration (s), outputs at a rate (1/s), as a whole and broken off half-way and taken up
-    again: rows of the table. ``changes`` to the scene give the speed of a stable limit cycle.
+    """Run a limit cycle over a long duration (s), once without and once with an interruption half-way.
+
+    Outputs are at a rate (1/s). The ``changes`` to the scene set a speed with a stable limit cycle. Returns rows of the
+    table.
     """
     kept = {"integration.duration": duration, "output.rate": rate, "output.channels": "[pose, velocity]"}
     setting = prepare(vehicles, name, {**changes, **kept})
@@ -58,7 +62,7 @@ def hunting(vehicles, name, changes, duration, rate=200.0):
 
 
 def _with_memory(scene, path, block, duration):
-    """A run, and the peak of its memory in the second half over that in the first."""
+    """Return a run, and the ratio of the peak memory in its second half to that in its first half."""
     peaks = []
 
     def half_way(t):
@@ -84,7 +88,7 @@ def _break_off_at(t):
 
 
 def _differing_channels(one, other):
-    """Number of datasets in which two run files differ by any bit, the end's among them."""
+    """Return the number of datasets, including the last state, that are not bitwise identical in two run files."""
     differing = 0
     with h5py.File(one, "r") as first, h5py.File(other, "r") as second:
         names = []
@@ -96,8 +100,10 @@ def _differing_channels(one, other):
 
 
 def _drifts(run, setting):
-    """Relative change of the first wheelset's amplitude (sqrt(2) times the root mean square over whole periods) and
-    mean lateral kinetic energy, second part to last.
+    """Return the relative changes of the first wheelset's amplitude and mean lateral kinetic energy.
+
+    Compared are the second and the last part of the run. The amplitude is sqrt(2) times the root mean square over whole
+    periods.
     """
     body = int(setting.model.bodies.wheelsets[0])
     wheelset = run[setting.scene.vehicle.body_names[body]]
@@ -115,7 +121,7 @@ def _drifts(run, setting):
 
 
 def _trajectory(run):
-    """The counters of a run as the table takes them."""
+    """Return a `Trajectory` without states that has the counters of a run, for the rows of the table."""
     counters = run.counters
     ends = np.array([run.t[-1] - counters["simulated_s"], run.t[-1]])
     return Trajectory(
