@@ -100,8 +100,8 @@ def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
     """Check creep laws with a vehicle's table and material at the limits of their range; return rows of the table.
 
     The patches have semi-axes with the ``ratios`` a/b. Creepages and spin have the nondimensional ``sizes``, one at a
-    time and all together. A relative change of a/b by a tenth of ``tolerance`` may change a force by ``tolerance``,
-    relative to mu N.
+    time and all together. A relative change of a/b by 1e-4 may change a force by at most ``tolerance``, relative to
+    mu N.
     """
     found = []
     directions = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])

@@ -19,49 +19,54 @@ from wrcore.integrate.tolerances import LENGTH, SHARE
 from wrcore.run.simulate import output_times
 
 LARGEST_ERROR = 30.0
-"""Global error over what a step may err by (rtol times 1 cm) that a run of a second may have."""
+"""Maximum global error of a run of 1 s, relative to the accepted error of one step (rtol times 1 cm)."""
 
 TO_FLANGE = 4e-3
-"""Travel of a wheelset that was released at 2 mm to the flange contact at 6 mm, m. A run whose single steps may have a
-larger error may leave the track. rk4 (`SHARE` 5) may have 5 mm in a step at rtol 0.1: its steps of 3 to 6 ms are longer
-than the 2.1 ms that are stable, and all six runs derail that start at 1.8 to 2.01 mm; at 0.05 none does."""
+"""Distance to flange contact at 6 mm of a wheelset released at 2 mm, m. A run may derail if the accepted error of a
+step is larger. For rk4 (`SHARE` 5) it is 5 mm at rtol 0.1. The steps of 3 to 6 ms are then longer than the stable
+2.1 ms, and all six runs that start at 1.8 to 2.01 mm derail. At rtol 0.05 no run derails."""
 
 OVER_THE_FLANGE = "one step may have a larger error than the travel to the flange: a run can derail"
 
 STABILITY_MATCH = 0.15
-"""Largest stable step found less the predicted one, of the predicted one: friction bends what is linear."""
+"""Maximum difference between found and predicted stable step, relative to the predicted one. They differ because
+friction is nonlinear."""
 
 SEARCH = 1.04
-"""Factor to which a largest stable step is found."""
+"""Ratio of the bounds at which the search for the maximum stable step ends."""
 
 GROWS = "above the critical speed the motion grows of itself, with steps of metres by an old Jacobian faster"
 
 BOUNDED = "below 0.3 m/s trials settle at creepages where friction is softer than the linear one: longer steps pass"
-"""Suspended wheelset at 0.1 m/s: trials move by up to 3.6e-5 m/s, a creepage of 3.6e-4. Slopes of the creep force, as
-difference quotients over 1e-4 m/s, are 3 to 13 % smaller than at rest. ``rk45`` at 1.1 times the linear step stays
-there for 400 steps; at 1.2 times it leaves by 4e-4 m/s and comes back below the 4e-5 m/s of a trial at times."""
+"""Reason for stable steps above the predicted ones, from the suspended wheelset at 0.1 m/s. Trials deviate by up to
+3.6e-5 m/s, a creepage of 3.6e-4. Derivatives of the creep force, as difference quotients over 1e-4 m/s, are 3 to 13 %
+smaller than at rest. With 1.1 times the predicted step, ``rk45`` stays within this deviation for 400 steps. With 1.2
+times this step it deviates by 4e-4 m/s, and at times is again below the 4e-5 m/s that a trial may have."""
 
 DISTURBANCE = 1e-8
-"""Of velocities at the start of a trial, m/s and rad/s: small enough for friction to stay linear at 0.1 m/s."""
+"""Disturbance of velocities at the start of a trial, m/s and rad/s. It is so small that friction is linear at
+0.1 m/s."""
 
 GROWTH = 1e3
-"""A trial that drives two runs apart by more than this factor is unstable: hunting alone takes seconds for it."""
+"""Growth of the difference between two runs above which a trial is unstable. Hunting needs seconds for such growth."""
 
 UNSTEADY, SETTLING = 1e-4, 3e-5
-"""A trial whose velocities leave steady running by more than this part of the speed and this much (m/s, rad/s) is
-unstable, too: both runs may be on one and the same oscillation, which friction bounds at creepages of some 1e-3. The
-second number is what velocities settle by: a computed steady state is the less exact the slower it is."""
+"""Bounds of the deviation of velocities from steady running: part of the speed, and absolute value (m/s, rad/s). A
+trial beyond their sum is unstable too: both runs may have the same oscillation, which friction bounds at creepages of
+some 1e-3. The second number allows for settling, because computed steady states are less accurate at low speed."""
 
 LONGEST_TRIAL = 1.0
-"""s."""
+"""Maximum duration of a trial, s."""
 
 VIOLATION = 1e-5
-"""Of a joint, m or rad: a tenth of the bushes' play."""
+"""Maximum violation of a joint, m or rad: a tenth of the bushes' play."""
 
 
 def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duration):
-    """Every method from very loose to very tight at a speed (m/s) for a duration (s): it survives, and errors fall with
-    the tolerance. Rows of the table, and curve of error_m (largest in y), steps and wall_s over rtol.
+    """Run every method with loose to tight tolerances at a speed (m/s) for a duration (s).
+
+    Each run must complete, and errors must decrease with the tolerance. Returns rows of the table, and curve of error_m
+    (maximum in y), steps and wall_s over rtol.
     """
     found, curve = [], []
     for name, detection in product(names, detections):
@@ -90,7 +95,10 @@ def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duratio
 
 
 def amplification(method, z):
-    """Stability function R(z) of a method: what a step makes of y' = lambda y, z = h lambda, for any array of z."""
+    """Return the stability function R(z) of a method: the factor of a step for y' = lambda y, with z = h lambda.
+
+    ``z`` is an array of any shape.
+    """
     z = np.asarray(z, complex)
     if method in EXPLICIT:
         weights, terms = EXPLICIT[method].stages, []
@@ -98,7 +106,7 @@ def amplification(method, z):
         for i in range(len(weights)):
             stage = np.ones_like(z) + sum((z * weights[i, j] * terms[j] for j in range(i)), np.zeros_like(z))
             terms.append(stage)
-            total = stage  # the last stage is taken at the new state
+            total = stage  # the last stage is evaluated at the new state
         return total
     table, gamma = ROSENBROCK[method], ROSENBROCK[method].gamma
     increments = []
@@ -110,7 +118,7 @@ def amplification(method, z):
 
 
 def predicted_step(method, eigenvalues, longest):
-    """Largest fixed step (s) for which a method damps all decaying motions; ``longest`` if none bounds it."""
+    """Return the maximum fixed step (s) at which a method damps all decaying motions; ``longest`` if unbounded."""
     decaying = eigenvalues[eigenvalues.real < -1e-6]
 
     def excess(step):
@@ -125,8 +133,9 @@ def predicted_step(method, eigenvalues, longest):
 
 
 def stability_map(vehicles, names, speeds, methods, longest):
-    """Largest stable fixed step of every method over speed (m/s), up to ``longest`` (s), against that of the linearised
-    motion: rows of the table, and curve of predicted_s and found_s.
+    """Compare the maximum stable fixed step of every method over speed (m/s) with that of the linearised motion.
+
+    Steps are limited to ``longest`` (s). Returns rows of the table, and curve of predicted_s and found_s.
     """
     found, curve = [], []
     for name, speed in product(names, speeds):
@@ -149,15 +158,16 @@ def stability_map(vehicles, names, speeds, methods, longest):
 
 
 def step_limit(speed, values, longer):
-    """Why the largest stable step found may be off the linear one's at a speed (m/s) with these eigenvalues (1/s), an
-    empty text where it may not be; ``longer``: whether it is longer."""
+    """Return the reason for which the maximum stable step may differ from that of the linearised motion, or "".
+
+    The speed is in m/s, the eigenvalues ``values`` in 1/s. ``longer`` is True if the step found is longer."""
     if values.real.max() > 1.0:
         return GROWS
     return BOUNDED if longer and UNSTEADY * speed < SETTLING else ""
 
 
 def _nudged(model, state):
-    """The same with all velocities disturbed."""
+    """Return a copy of a state with all velocities disturbed by `DISTURBANCE`."""
     state = state.copy()
     for body in range(len(model.bodies.mass)):
         at = STATE_SIZE * body
@@ -166,7 +176,10 @@ def _nudged(model, state):
 
 
 def _largest_step(setting, method, guess, longest):
-    """Largest stable step near a guess (s), bracketed by factors and halved on the logarithm; and the run with it."""
+    """Return the maximum stable step (s) near a guess, and the run with it.
+
+    The step is bracketed by factors, then bisected on its logarithm.
+    """
 
     twin = _nudged(setting.model, setting.state)
 
@@ -201,12 +214,12 @@ def _largest_step(setting, method, guess, longest):
 
 
 def _velocities(model):
-    """Places of the velocities in the state vector."""
+    """Return the indices of the velocities in the state vector."""
     return np.concatenate([STATE_SIZE * body + np.arange(7, 13) for body in range(len(model.bodies.mass))])
 
 
 def violations(model, times, states):
-    """Largest violation of the joints' equations over time, m or rad, shape (n,)."""
+    """Return the maximum violation of the joints' equations at each time, m or rad, shape (n,)."""
     equations, work = Equations(model), constraint_workspace(model.joints)
     largest = np.zeros(len(times))
     for i, (t, state) in enumerate(zip(times, states, strict=True)):
@@ -217,9 +230,10 @@ def violations(model, times, states):
 
 
 def baumgarte(vehicles, name, pairs, duration, methods):
-    """Joints under Baumgarte's feedback (``pairs`` of alpha and beta, 1/s) from none to very stiff for a duration (s):
-    drift, and what it costs in steps. Rows of the table, and curve of violation_m, steps, smallest_step_s and
-    fastest_root_per_s.
+    """Measure drift of joints and number of steps with Baumgarte's feedback, from none to very stiff.
+
+    ``pairs`` are alpha and beta (1/s); runs take a duration (s). Returns rows of the table, and curve of violation_m,
+    steps, smallest_step_s and fastest_root_per_s.
     """
     found, curve = [], []
     for method, (alpha, beta) in product(methods, pairs):
@@ -241,8 +255,9 @@ def baumgarte(vehicles, name, pairs, duration, methods):
 
 
 def long_run(vehicles, names, duration, changes, rate, methods):
-    """Long hunting for a duration (s), outputs at a rate (1/s): joints, Euler parameters and the amplitude do not
-    drift. Rows of the table, and curve of violation_m and norm over t_s.
+    """Check that joints, Euler parameters and amplitude do not drift over hunting for a long duration (s).
+
+    Outputs are at a rate (1/s). Returns rows of the table, and curve of violation_m and norm over t_s.
     """
     found, curve = [], []
     for name, method in product(names, methods):
@@ -271,7 +286,7 @@ def long_run(vehicles, names, duration, changes, rate, methods):
 
 
 def restarts(vehicles, names, duration, pause, methods, detections):
-    """A run taken up from where it paused is the unbroken one to the bit."""
+    """Check that a run that is paused and continued is bitwise identical to the uninterrupted run."""
     found = []
     for name, method, detection in product(names, methods, detections):
         setting = prepare(vehicles, name, {"integration.method": method, "contact.detection": detection})

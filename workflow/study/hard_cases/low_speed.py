@@ -1,4 +1,4 @@
-"""Hard cases at low speed: creepages grow like 1/V, and with them the stiffness of the equations of motion."""
+"""Hard cases at low speed: creepages and the stiffness of the equations of motion grow in proportion to 1/V."""
 
 from itertools import product
 
@@ -14,22 +14,25 @@ from wrcore.contact.search import reduction
 DETECTIONS = ("planar", "spatial")
 
 STEPS_PER_TIME_SCALE = 20.0
-"""No method needs shorter steps than such a part of the fastest time scale of the linearised motion; ROS34PW2 comes
-nearest, whose optimistic estimate is held to a tenth of the tolerance."""
+"""Maximum number of steps in the fastest time scale of the linearised motion. ROS34PW2 needs most, because its
+optimistic error estimate is limited to a tenth of the tolerance."""
 
 ROLLING_ERROR = 1e-3
-"""Slip's share of the speed lost in braking: the force that turns the wheels needs creepages well below it."""
+"""Maximum share of slip in the speed lost by braking. The force that decelerates the rotation of the wheels needs much
+smaller creepages."""
 
 
 def fastest_time_scale(setting):
-    """1/|lambda| of the fastest small motion about steady running, s."""
+    """Return 1/|lambda| (s) of the fastest mode of small motion about steady running."""
     motion = steady_running(*straight_ahead(setting.scene))
     return 1.0 / float(np.max(np.abs(np.linalg.eigvals(motion.matrix))))
 
 
 def ladder(vehicles, speeds, methods, duration):
-    """Vehicles released off the centre for a duration (s) at ever lower speeds (m/s), down to the lowest of each
-    integrator (``methods``, m/s): no blow-up, no step collapse; rows of the table.
+    """Release vehicles off the centre for a duration (s) at decreasing speeds (m/s); return rows of the table.
+
+    ``methods`` contains the lowest speed (m/s) of each integrator. Motions must stay bounded, and steps must not
+    collapse.
     """
     found = []
     for name, detection, speed, method in product(vehicles, DETECTIONS, speeds, methods):
@@ -49,11 +52,11 @@ def ladder(vehicles, speeds, methods, duration):
 
 
 def slow_path(vehicles, name, speeds, distance, critical_speed):
-    """One suspended wheelset over the same distance (m) at several falling speeds (m/s): without inertia its path is
-    that of the slowest; rows of the table.
+    """Compare the paths of a suspended wheelset over a distance (m) at decreasing speeds (m/s).
 
-    Springs and rolling depend on the distance alone. Inertia forces grow like V^2 and reach the size of the others at
-    the critical speed (m/s).
+    Forces of springs and rolling depend only on the distance. Inertia forces are proportional to V^2 and reach the size
+    of the others at the critical speed (m/s). At low speeds the path therefore equals that at the lowest speed. Returns
+    rows of the table.
     """
     found = []
     for detection in DETECTIONS:
@@ -73,9 +76,10 @@ def slow_path(vehicles, name, speeds, distance, critical_speed):
 
 
 def regularisation(vehicles, name, speeds, least_speeds, distance):
-    """Influence over a distance (m) of the smallest speed that creepages are divided by (``contact.creep.least_speed``,
-    m/s; the first, below all speeds, is compared with), at speeds (m/s) above and below it: rows of the table, and
-    curve of y_off_m (largest departure from the first run).
+    """Measure the influence of the minimum speed by which creepages are divided, over a distance (m).
+
+    ``least_speeds`` are values of ``contact.creep.least_speed`` (m/s). The first value is below all ``speeds`` (m/s)
+    and is the reference. Returns rows of the table, and curve of y_off_m (maximum deviation from the reference).
     """
     found, curve, reference = [], [], {}
     for speed, least in product(speeds, least_speeds):
@@ -94,7 +98,7 @@ def regularisation(vehicles, name, speeds, least_speeds, distance):
 
 
 def _let_go(setting):
-    """Take away what couples a vehicle to the moving frame along the track, and forbid nothing else."""
+    """Remove the longitudinal coupling of a vehicle to the moving frame; other couplings stay."""
     elements = setting.model.elements
     for pair in np.flatnonzero(elements.pairs[:, 1] == FRAME):
         own = slice(elements.first_spring[pair], elements.first_spring[pair + 1])
@@ -102,7 +106,7 @@ def _let_go(setting):
 
 
 def rolling_momentum(setting, states):
-    """Momentum along the track and, over the rolling radius, of the wheelsets' spin, kg m/s, shape (n,)."""
+    """Return the longitudinal momentum plus the wheelsets' angular momentum over the rolling radius, kg m/s, (n,)."""
     bodies, total = setting.model.bodies, 0.0
     for body, mass in enumerate(bodies.mass):
         part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
@@ -115,7 +119,7 @@ def rolling_momentum(setting, states):
 
 
 def largest_drag(setting):
-    """Bound of what spin creep takes from rolling: sum of mu N c sin(contact angle)/r over all wheels, N."""
+    """Return an upper bound of the drag by spin creep: the sum of mu N c sin(contact angle)/r over all wheels, N."""
     patches = contacts(setting.model, np.zeros(1), setting.state[None, :])
     size = np.sqrt(patches[..., reduction.SEMI_A] * patches[..., reduction.SEMI_B])
     moment = patches[..., reduction.NORMAL] * size * np.abs(np.sin(patches[..., reduction.ANGLE]))
@@ -123,12 +127,13 @@ def largest_drag(setting):
 
 
 def braking(vehicles, speed, deceleration, rest, least_speeds):
-    """Vehicles that a constant force slows down from a speed (m/s) at a deceleration (m/s^2) to standstill, where it
-    ends; then they must stay for ``rest`` (s). Rows of the table, and curve of v_m_per_s over t_s, by
-    ``contact.creep.least_speed`` (m/s).
+    """Brake vehicles with a constant force to standstill; then they must stand still for ``rest`` (s).
 
-    The frame runs at constant speed, so the vehicle is let go from it along the track and drawn back at its heaviest
-    body. Wheels that roll lose momentum at the rate of the force, their spin included: m v + J omega/r = P0 - F t.
+    The initial speed is in m/s, the deceleration in m/s^2. Returns rows of the table, and curve of v_m_per_s over t_s
+    for each ``contact.creep.least_speed`` (m/s).
+
+    The moving frame has constant speed. Therefore the vehicle is uncoupled from it along the track, and the force acts
+    on the heaviest body. For rolling wheels the momentum, with spin, is m v + J omega/r = P0 - F t.
     """
     found, curves = [], []
     for name, detection, least in product(vehicles, DETECTIONS, least_speeds):
@@ -156,7 +161,7 @@ def braking(vehicles, speed, deceleration, rest, least_speeds):
 
 
 def _stopped(setting, force, stop, rest):
-    """Trajectory under a force that ends at a time (s)."""
+    """Return the trajectory under a force that ends at the time ``stop`` (s), and for ``rest`` (s) after it."""
 
     def change(t, _):
         force[:] *= t < stop - 1e-9

@@ -12,19 +12,21 @@ from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.scene.compile import compile_scene
 
 IMPULSE_ERROR = 1e-3
-"""Of the load's impulse: forces sampled at the output rate are integrated to about this."""
+"""Accepted error of the impulse, relative to that of the load. It is about the accuracy of integrals of forces sampled
+at the output rate."""
 
 HALF_SPACE = 0.1
-"""Largest semi-axis over the rail head's radius for which a patch counts as plane."""
+"""Maximum ratio of a semi-axis to the rail head's radius for which a patch is regarded as plane."""
 
 HEAD_RADIUS = 0.3
-"""Of the UIC60's running surface, m (60E1: EN 13674-1)."""
+"""Radius of the UIC60's running surface, m (60E1: EN 13674-1)."""
 
 
 def worn(wheel, rail, offset, share, reach):
-    """Ordinates (n,), m, at its nodes of a wheel profile that is worn towards the rail around the tape circle: wear has
-    closed a ``share`` of the gap at the middle and ends at ``reach`` (m) from it; ``offset`` (m) is the wheel's minus
-    the rail's lateral coordinate of the same place in the track.
+    """Return ordinates (n,), m, at the nodes of a wheel profile that is worn towards the rail around the tape circle.
+
+    Wear has closed a ``share`` of the gap at the tape circle and ends at the distance ``reach`` (m) from it. ``offset``
+    (m) is the wheel's minus the rail's lateral coordinate of the same position in the track.
     """
     on_rail = np.clip(wheel.u - offset, rail.u[0], rail.u[-1])
     gap = wheel.f - np.interp(on_rail, rail.u, rail.f)
@@ -34,14 +36,15 @@ def worn(wheel, rail, offset, share, reach):
 
 
 def kinked(wheel, height, place, half_width):
-    """Ordinates of a wheel profile with a ridge (negative height: a groove) of triangular shape, m."""
+    """Return the ordinates (m) of a wheel profile with a triangular ridge, or a groove for negative height."""
     return wheel.f - height * np.clip(1.0 - np.abs(wheel.u - place) / half_width, 0.0, None)
 
 
 def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.inf):
-    """A `ProfileCurve` from points of a wheel profile with ordinates (n,) at its nodes, up to ``end``, at a spacing,
-    with a ``noise`` (standard deviation) on ordinates and ``smoothing`` (root mean square distance that the curve may
-    keep from the points), all m.
+    """Return a `ProfileCurve` through equally spaced points of a wheel profile with given ordinates (n,) at its nodes.
+
+    Points reach up to ``end``. ``noise`` is the standard deviation added to ordinates, ``smoothing`` the root mean
+    square distance allowed between curve and points. All lengths are in m.
     """
     u = np.append(-np.arange(0.0, -wheel.u[0], spacing)[:0:-1], np.arange(0.0, wheel.u[-1], spacing))
     u = u[u <= end]
@@ -50,8 +53,10 @@ def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.
 
 
 def variants(setting, entries):
-    """Wheel profiles of the cases by name, each a function that makes a ProfileCurve or raises InputError; entries hold
-    ``kind`` (worn, kinked or plain), its arguments, and those of :func:`sampled`.
+    """Return functions that make the wheel profiles of the cases, by name.
+
+    Each function returns a ProfileCurve or raises InputError. The entries contain ``kind`` (worn, kinked or plain), its
+    arguments, and those of :func:`sampled`.
     """
     scene = setting.scene
     offset = scene.track.rail_distance(scene.rail) - scene.vehicle.half_distance
@@ -71,8 +76,9 @@ def variants(setting, entries):
 
 
 def profiles(vehicles, names, entries, duration, detections, methods):
-    """Vehicles on unusual profiles (``entries`` of :func:`variants`) for a duration (s): an answer that keeps the laws
-    of mechanics, or a refusal; rows of the table.
+    """Run vehicles on unusual profiles (``entries`` of :func:`variants`) for a duration (s); return rows of the table.
+
+    Results must satisfy the laws of mechanics, or the profile must be refused.
     """
     found = []
     for name in names:
@@ -99,7 +105,7 @@ def _attempt(setting, make):
 
 
 def _profile_checks(setting, trajectory):
-    """Newton's law for the vertical motion of all bodies, and the size of the patches."""
+    """Return the checks of Newton's law for the vertical motion of all bodies, and of the size of the patches."""
     patches = contacts(setting.model, trajectory.t, trajectory.states)
     off = impulse_error(setting, trajectory, patches)
     largest = float(np.nanmax(patches[..., reduction.SEMI_B])) / HEAD_RADIUS

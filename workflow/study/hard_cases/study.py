@@ -1,4 +1,4 @@
-"""The stability study: families of hard cases as its configuration names them, one table, and its summary."""
+"""The stability study: families of hard cases from the configuration, their table, and its summary."""
 
 import pandas as pd
 
@@ -28,16 +28,16 @@ FAMILIES = {
     "streaming": {"hunting": long.hunting},
     "track": {"irregular": track.irregular, "curve": track.curve},
 }  # fmt: skip
-"""Functions of each family by the name of their settings; all but ``pose_sweeps`` take the vehicles first."""
+"""Functions of each family by the name of their settings. The vehicles are the first argument, except of
+``pose_sweeps``."""
 
 
 def run_family(family, vehicles, settings, progress=None):
-    """Run one of the `FAMILIES` of hard cases: its table (:data:`study.hard_cases.cases.COLUMNS`), and by function what
-    figures need.
+    """Run one of the `FAMILIES` of hard cases; return its table and, by function, the curves for figures.
 
-    ``settings`` are the arguments of each of the family's functions; ``vehicles`` among them picks some vehicles by
-    name for functions that run all they are given. ``progress`` wraps the functions' names. InputError if settings are
-    missing or unknown.
+    The table has the columns :data:`study.hard_cases.cases.COLUMNS`. ``settings`` are the arguments of each of the
+    family's functions. For functions that run all given vehicles, the setting ``vehicles`` selects some by name.
+    ``progress`` wraps the functions' names. InputError if settings are missing or unknown.
     """
     if set(settings) != set(FAMILIES[family]):
         expected = f"expected settings for {', '.join(FAMILIES[family])}"
@@ -55,11 +55,10 @@ def run_family(family, vehicles, settings, progress=None):
 
 
 def summary(found):
-    """What came of each case of all families: its runs by outcome, and the check that came closest to its limit or went
-    beyond.
+    """Return the summary of all families: one row per case with its runs by outcome and its checks.
 
     Columns: family, case, runs, survived, refused, failed, checks, passed, known (failed checks with a known limit),
-    steps (largest), smallest_step_s, wall_s (all runs).
+    steps (maximum), smallest_step_s, wall_s (sum of all runs).
     """
     rows = []
     keys = ["condition", "vehicle", "detection", "integrator"]
@@ -78,7 +77,7 @@ def summary(found):
 
 
 def known_limits(found):
-    """Known limits of the models that cases have met: where, how often (times), and by how much (value, the worst)."""
+    """Return the known limits of the models that cases have exceeded: case, number (times), and worst value."""
     met = found[found["known_limit"].fillna("") != ""]
     columns = ["family", "case", "invariant", "known_limit"]
     if met.empty:
@@ -90,12 +89,12 @@ def known_limits(found):
 
 
 def unexplained(found):
-    """Rows that neither passed nor met a known limit."""
+    """Return the rows of failed checks that have no known limit."""
     return found[~found["passed"].astype(bool) & (found["known_limit"].fillna("") == "")]
 
 
 def report_text(found):
-    """The study's summary in Markdown: totals, cases, known limits and whatever failed without a known reason."""
+    """Return the study's summary in Markdown: totals, cases, known limits and failures without a known reason."""
     cases, limits, open_rows = summary(found), known_limits(found), unexplained(found)
     totals = cases[["runs", "survived", "refused", "failed", "checks", "passed", "known"]].sum()
     lines = [
@@ -111,7 +110,7 @@ def report_text(found):
 
 
 def _markdown(frame):
-    """A table in Markdown."""
+    """Return a table in Markdown."""
 
     def cell(value):
         return f"{value:.3g}" if isinstance(value, float) else str(value)

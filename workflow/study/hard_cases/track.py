@@ -1,4 +1,4 @@
-"""Hard cases of the track: irregular rails, and a sharp curve at the speed of its cant and above."""
+"""Hard cases of the track: irregular rails, and a sharp curve at balance speed and above."""
 
 import math
 from itertools import product
@@ -9,23 +9,27 @@ from study.hard_cases.cases import Check, contacts, impulse_error, prepare, rows
 from wrcore.bodies.marker import FRAME
 
 CANT_BASE = 1.5
-"""Distance over which cant is measured, m."""
+"""Lateral distance over which cant is measured, m."""
 
 IMPULSE_ERROR = 2e-3
-"""Of the load's impulse: forces on irregular rails are sampled at the output rate."""
+"""Accepted error of the impulse, relative to that of the load. Forces on irregular rails are sampled at the output
+rate."""
 
 CURVE_ERROR = 5e-3
-"""Of the weight: what swings of the bodies leave of a mean over some seconds."""
+"""Accepted error of forces in the curve, relative to the weight. Oscillations of the bodies contribute this much to a
+mean over some seconds."""
 
 
 def balance_speed(radius, cant):
-    """Speed at which a curve's cant takes up all lateral acceleration, m/s."""
+    """Return the speed (m/s) at which a curve's cant balances the lateral acceleration."""
     return math.sqrt(9.81 * abs(radius) * math.tan(math.asin(cant / CANT_BASE)))
 
 
 def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
-    """Vehicles at speeds (m/s, by vehicle) for a duration (s) on a length (m) of irregular straight track, ``spectra``
-    being level and seed: they stay on it, and the rails carry the load; rows of the table.
+    """Run vehicles for a duration (s) on a length (m) of irregular straight track; return rows of the table.
+
+    Speeds (m/s) are given by vehicle; ``spectra`` are pairs of level and seed. Vehicles must stay on the track, and the
+    rails must carry the load.
     """
     found = []
     for name, (level, seed), method, detection in product(speeds, spectra, methods, detections):
@@ -47,12 +51,14 @@ def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
 
 
 def curve(vehicles, names, radius, cant, lengths, shares, duration, methods, detections):
-    """A curve of a radius and cant (m) with tangent and transition (``lengths``, m) for a duration (s, the last quarter
-    is looked at) at the speed that its cant balances, and faster (``shares`` of it): forces of all wheels on the rails.
-    Rows of the table, and history of Y_N (lateral, all wheels) and expected_N over t_s.
+    """Check the forces of all wheels on the rails in a curve of given radius and cant (m), at balance speed and above.
 
-    In the track's canted axes the rails carry m (g cos + V^2/R sin) and push with m (V^2/R cos - g sin), the angle
-    being that of the cant.
+    ``lengths`` (m) are tangent, transition and curve; ``shares`` are speeds relative to balance speed. Runs take a
+    duration (s), and the checks use its last quarter. Returns rows of the table, and history of Y_N (lateral, all
+    wheels) and expected_N over t_s.
+
+    In the track's canted axes the vertical force on the rails is m (g cos + V^2/R sin). The lateral force is
+    m (V^2/R cos - g sin). The angle is that of the cant.
     """
     found, history = [], []
     tangent, transition, length = lengths
@@ -74,7 +80,7 @@ def curve(vehicles, names, radius, cant, lengths, shares, duration, methods, det
 
 
 def _in_curve(setting, trajectory, vertical, lateral, radius, cant):
-    """Checks of the forces in the curve, and the expected lateral force on the rails, N."""
+    """Return the checks of the forces in the curve, and the expected lateral force on the rails, N."""
     elements, mass = setting.model.elements, float(np.sum(setting.model.bodies.mass))
     held = np.flatnonzero(elements.pairs[:, 1] == FRAME)
     springs = [k for p in held for k in range(elements.first_spring[p], elements.first_spring[p + 1])]
@@ -87,7 +93,7 @@ def _in_curve(setting, trajectory, vertical, lateral, radius, cant):
         Check("vertical force less m (g cos + V^2/R sin), of the weight",
               abs(float(np.mean(vertical[late])) - load) / weight, CURVE_ERROR, "1", "Newton's law in the curve"),
     ]  # fmt: skip
-    if not np.any(elements.springs[springs, 7]):  # nothing but the rails holds the vehicle sideways
+    if not np.any(elements.springs[springs, 7]):  # only the rails guide the vehicle laterally
         off = abs(float(np.mean(lateral[late])) - sideways) / weight
         source = "Newton's law in the curve"
         checks.append(Check("lateral force less m (V^2/R cos - g sin), of the weight", off, CURVE_ERROR, "1", source))
