@@ -1,1 +1,1 @@
-"""The report and the notebooks."""
+"""Pages and tables that present the results of the study."""

@@ -1,13 +1,13 @@
-"""The answer of each page of the report: one or two sentences, their numbers from the study's tables.
+"""The answer of each page of the report: one or two sentences with numbers from the study's tables.
 
-A function per category of results, in reading order. Each takes ``read``, which gives a table by its path under the
-results, and tables by name where the path has a star.
+Each category of results has one function, in reading order. Its argument ``read`` is a function that returns a table by
+its path below the results, or tables by name if the path contains a star.
 """
 
 import numpy as np
 
 ACCURACY = 1e-6
-"""Of the lateral position, m: what speed is said for, or the nearest that the study asks for."""
+"""Accuracy of the lateral position for which the answer states the speed, m; the nearest one in the study is used."""
 
 
 def _percent(value):
@@ -182,4 +182,4 @@ ANSWERS = {
     "13 Wear": _wear,
     "14 Crossings": _crossings,
 }
-"""By category of the results, in reading order."""
+"""Function of the answer for each category of the results, in reading order."""

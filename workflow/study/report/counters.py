@@ -12,14 +12,14 @@ PAGE = ROOT / "reports/how_runs_end.md"
 
 
 def counted(name):
-    """Where a counter is counted."""
+    """Return the part of a run in which a counter is counted, as the table shows it."""
     if name in LOOK_UP_ERRORS:
         return "output times, with `tabulated`"
     return "integration" if name in COUNTERS else "output times"
 
 
 def counters_table():
-    """All counters in Markdown: name, where it is counted, what it counts."""
+    """Return the table of all counters in Markdown: name, part of the run, and meaning."""
     heads = ["counter", "from", "what it counts or measures"]
     return markdown(heads, [[f"`{name}`", counted(name), text] for name, text in MEANINGS.items()])
 

@@ -1,4 +1,4 @@
-"""The page of evidence: what each physical claim is held against, and the test that asserts it.
+"""The page of evidence: the reference of each physical claim, and the test that checks it.
 
 ``python -m study.report.evidence`` writes ``reports/evidence.md`` from ``reports/evidence.yaml``.
 """
@@ -48,12 +48,13 @@ NOT_HELD = """
 
 
 def read():
-    """Content of the table of evidence: ``sections``, titles with rows, and ``shipped``, examples of CONTACT."""
+    """Return the table of evidence: ``sections``, titles with rows, and ``shipped``, examples of CONTACT."""
     return yaml.safe_load(SOURCE.read_text("utf-8"))
 
 
 def source_of(test):
-    """Source of a test with its decorators, from ``file::function`` below ``tests/``; LookupError if there is none."""
+    """Return the source of a test with its decorators, from ``file::function`` below ``tests/``; LookupError if there
+    is none."""
     name, _, function = test.partition("::")
     path = ROOT / "tests" / name
     if not path.is_file():
@@ -67,7 +68,7 @@ def source_of(test):
 
 
 def page():
-    """The page in Markdown."""
+    """Return the page of evidence in Markdown."""
     content, parts = read(), [HEAD]
     for section in content["sections"]:
         head = f"| {' | '.join(COLUMNS.values())} | reached | test |"

@@ -1,4 +1,4 @@
-"""What a reader of a figure stumbles over: texts that overlap, leave the page or lie on a line."""
+"""Checks that a figure is legible: texts must not overlap, cross the page's edge or cover a line."""
 
 import warnings
 from itertools import combinations
@@ -9,20 +9,21 @@ import numpy as np
 from wrcore.analysis.pictures import style
 
 BORDER = 1.0
-"""Texts may touch each other, and reach over the page's edge, by this much, points."""
+"""Accepted overlap of texts with each other and with the page's edge, points."""
 
 
 def save_figure(figure, *paths):
-    """Write a figure as `style.save_figure` does; texts that cannot be read are a UserWarning."""
+    """Write a figure with `style.save_figure`, with a UserWarning for each illegible text."""
     style.save_figure(figure, *paths)
     for finding in findings(figure):
         warnings.warn(f"figure {Path(paths[0]).name}: {finding}", stacklevel=2)
 
 
 def findings(figure):
-    """Texts of a figure that cannot be read, one line each: a text beyond the page, two that overlap, one or a legend
-    that covers a line or mark, an entry twice in a legend, an axis without numbers; those in three dimensions are left
-    out.
+    """Return the list of faults of a figure, one line each.
+
+    Faults are a text beyond the page, two overlapping texts, a text or legend on a line or mark, a duplicate entry of a
+    legend, and an axis without numbers. Texts and numbers of three-dimensional axes are not checked.
     """
     figure.draw_without_rendering()
     border = BORDER * figure.dpi / 72.0
@@ -63,14 +64,14 @@ def _within(box, page):
 
 
 def _box(text):
-    """Where a text stands (pixels), without the arrow of an annotation."""
+    """Return the bounding box of a text (pixels) without the arrow of an annotation."""
     from matplotlib.text import Text
 
     return Text.get_window_extent(text)
 
 
 def _texts(figure):
-    """Texts that are drawn."""
+    """Return the visible texts of a figure."""
     from matplotlib.text import Text
 
     hidden = {label for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for label in _undrawn(axes, axis)}
@@ -83,7 +84,7 @@ def _texts(figure):
 
 
 def _undrawn(axes, axis):
-    """Labels of ticks beyond the ends of an axis, or of axes that are switched off."""
+    """Yield the labels of ticks beyond the ends of an axis, and all labels of axes that are switched off."""
     low, high = sorted(axis.get_view_interval())
     room = 1e-9 * (high - low)
     for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
@@ -94,7 +95,9 @@ def _undrawn(axes, axis):
 
 
 def _mute(axes, name):
-    """Whether an axis with ticks shows no number, though its labels are not switched off, as in inner panels."""
+    """Whether an axis with ticks shows no number although its labels are switched on.
+
+    Inner panels have their labels switched off and are no fault."""
     axis = axes.xaxis if name == "x" else axes.yaxis
     side = ("bottom", "top") if name == "x" else ("left", "right")
     asked = [axis.get_tick_params(which="major").get(f"label{end}", False) for end in side]
@@ -108,7 +111,7 @@ def _mute(axes, name):
 
 
 def _shown(text):
-    """Whether a text at a place in its panel lies in what the panel shows."""
+    """Whether the position of a text is inside the visible range of its panel."""
     axes = text.axes
     if axes is None:
         return True
@@ -120,7 +123,7 @@ def _shown(text):
 
 
 def _covered(axes, box):
-    """Lines, marks and bars of a panel that lie in a box (pixels)."""
+    """Yield the lines, marks and bars of a panel that intersect a box (pixels)."""
     for line in axes.lines:
         if not line.get_visible() or not len(line.get_xydata()):
             continue
@@ -139,7 +142,7 @@ def _covered(axes, box):
 
 
 def _crosses(places, box):
-    """Whether a polyline with gaps (pixels) meets a box."""
+    """Whether a polyline with gaps (pixels) intersects a box."""
     from matplotlib.path import Path
 
     whole = np.isfinite(places).all(axis=1)

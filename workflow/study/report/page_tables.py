@@ -1,4 +1,4 @@
-"""Tables that pages show as the study's tables have them: `study.report.quoted` writes and compares them."""
+"""Tables of pages that are made from the study's tables; `study.report.quoted` writes and compares them."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,32 +7,32 @@ from study.accuracy.front import front_markdown
 
 
 class PageTable(NamedTuple):
-    """A table in Markdown from tables of the study."""
+    """A table in Markdown that is made from tables of the study."""
 
     reads: tuple
-    """Paths below the results."""
+    """Paths of the tables that are read, below the results."""
     make: Callable
-    """Function of a function that loads such a table."""
+    """Function that returns the table in Markdown; its argument is a function that loads a table by its path."""
     within: dict
     """Accepted relative deviation of columns that depend on the machine, by their heads."""
     chosen: bool = False
-    """Whether rows are chosen by time on the clock, so that another machine may have other ones."""
+    """Whether rows are chosen by measured time, so that another machine may choose other rows."""
 
 
 def markdown(heads, rows):
-    """A table in Markdown of rows of texts."""
+    """Return a table in Markdown from heads and rows of texts."""
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def short(number, digits=2):
-    """A number with some significant digits, without an exponent."""
+    """Return a number as text with the given number of significant digits, without an exponent."""
     rounded = float(f"{number:.{digits}g}")
     return f"{rounded:.10f}".rstrip("0").rstrip(".")
 
 
 def requests_table(load):
-    """Accuracies that were asked for, from `study.accuracy.requests.summary`."""
+    """Return the table of requested accuracies, from `study.accuracy.requests.summary`."""
     heads = ["of", "asked", "can be judged", "reached", "missed", "worst error over asked",
              "evaluations of all runs over the last's, median and largest"]  # fmt: skip
     rows = []
@@ -48,11 +48,11 @@ TIMED = {
     "wheelset_v20, first 0.5 s": "its first 0.5 s, before flanges strike",
     "suspended_v60": "suspended wheelset, 60 m/s, 10 s",
 }
-"""Cases of `study.paper.tables.timing_table` as the page names them."""
+"""Names on the page of the cases of `study.paper.tables.timing_table`."""
 
 
 def timing_pairs(load):
-    """Ratios planar / spatial of timed pairs: median, least and largest."""
+    """Return the table of the ratios planar / spatial of timed pairs: median, minimum and maximum."""
     heads = ["case", "pairs", "time of a run", "time of one evaluation", "number of evaluations"]
     table, rows = load("paper/timing.csv"), []
     for row in table[table["detection"] == "spatial"].to_dict("records"):
@@ -71,11 +71,11 @@ LONG = {
     "free wheelset, 20 m/s, up to 0.8 s": "free wheelset, on its flanges",
     "trailer vehicle, 60 m/s, irregular track": "trailer vehicle, rough track, 60 m/s",
 }
-"""Scenes of the study of accuracy with exact contact, as the page names them."""
+"""Names on the page of the scenes with exact contact in the study of accuracy."""
 
 
 def model_errors(load):
-    """Errors of ellipses and of interpolated contact beside exact contact, and those of its resolution."""
+    """Return the table of errors relative to exact contact, of ellipses, interpolation and coarser resolution."""
     heads = ["scene", "y, µm: `moment`", "`tabulated`", "`exact`, coarser", "N, %: `moment`", "`tabulated` (N)",
              "`exact`, coarser (N)", "wear number, %: `moment`", "`tabulated` (wear)",
              "`exact`, coarser (wear)"]  # fmt: skip
@@ -100,7 +100,7 @@ POSE_ERRORS = ["normal force at equal height", "greatest pressure under equal lo
 
 
 def pose_errors(load):
-    """Median, 95 % and worst error of each patch model at single poses, and the time of a patch."""
+    """Return the table of median, 95 % and maximum error of each patch model at single positions, and patch times."""
     table, costs = load("patch/summary.csv"), load("patch/costs.csv").set_index("model")
     table = table[table["zone"] == "everywhere"].set_index(["quantity", "model"])
     rows = []
@@ -118,7 +118,7 @@ RUN_MODELS = ["maximum", "moment", "exact", "looked_up"]
 
 
 def vehicle_models(vehicle, title):
-    """Function that makes the table of one vehicle with each patch model."""
+    """Return a function that makes the table of one vehicle with each patch model."""
 
     def make(load):
         table = load("patch/models.csv")
@@ -148,7 +148,7 @@ VARIANTS = {
 
 
 def wear_influences(load):
-    """Settings and models of a wear plan against the finest one."""
+    """Return the table of settings and models of a wear plan, compared with the finest one."""
     heads = ["variant", "largest deviation of the depth, % of the deepest", "worn area, %", "conicity (3 mm)", "CPU, s"]
     rows = []
     for row in load("wear/influences.csv").itertuples():
@@ -159,7 +159,7 @@ def wear_influences(load):
 
 
 def crossing_models(load):
-    """Patch models on the nose of a crossing against exact contact."""
+    """Return the table of patch models on the nose of a crossing, compared with exact contact."""
     table = load("crossings/models.csv")
     heads = ["patch, detection", "height, µm", "half the load on the nose, mm later", "greatest pressure, %",
              "time of a place over that of `exact`"]  # fmt: skip
@@ -172,7 +172,7 @@ def crossing_models(load):
 
 
 TIME = 0.5
-"""Accepted relative deviation of times: other machines, other hours."""
+"""Accepted relative deviation of times, which vary with the machine and its load."""
 
 FRONT = "accuracy/accuracy_front.csv"
 
@@ -194,4 +194,4 @@ TABLES = {
     "crossings": PageTable(("crossings/models.csv",), crossing_models,
                            {"time of a place over that of `exact`": TIME}),
 }  # fmt: skip
-"""By the name that ``reports/quoted.yaml`` uses."""
+"""Tables of pages by the name used in ``reports/quoted.yaml``."""

@@ -1,22 +1,22 @@
-"""Numbers that pages quote from tables of the study: compared with the tables, or written into the pages.
+"""Compare numbers on pages with the study's tables from which they are quoted, or write them into the pages.
 
 ``python -m study.report.quoted [FOLDER]`` prints each number of a page that differs from its table in the folder of
 results (``results``), and ends with status 1 if there is one. ``--write`` writes the numbers of the tables into the
 pages instead and keeps a copy of each table in ``reports/tables/`` (`make tables`).
 
-``reports/quoted.yaml`` lists the sentences and tables. A sentence of a page is given word by word with ``#`` for each
-number; ``values`` says in order where each number stands. A value has the keys
+``reports/quoted.yaml`` lists the sentences and tables. A sentence of a page is quoted verbatim with ``#`` for each
+number. ``values`` lists the source of each number, in the order of the sentence. A value has the keys
 
-``table``     path below the results; that of the sentence if left out
-``where``     values of columns that choose the rows, or a query of pandas
+``table``     path below the results; that of the sentence if omitted
+``where``     values of columns that select the rows, or a query of pandas
 ``column``    column of the number; ``columns`` gives several numbers of one row
-``of``        what of several rows: ``min``, ``max``, ``median``, ``sum``, ``count`` or ``first``
-``best``      columns: of each group the row with the largest ``column`` counts before ``of``
+``of``        reduction of several rows: ``min``, ``max``, ``median``, ``sum``, ``count`` or ``first``
+``best``      columns of groups; each group is reduced to the row with the maximum ``column``, before ``of``
 ``times``     factor to the printed unit
 ``over``      a value by which the number is divided
-``size``      true: without its sign
-``within``    accepted relative deviation of a number that depends on the machine; others agree as far as they are
-              printed
+``size``      true: absolute value
+``within``    accepted relative deviation of a number that depends on the machine; other numbers must agree to the
+              printed digits
 """
 
 import argparse
@@ -35,15 +35,15 @@ from study.report import page_tables
 ROOT = Path(__file__).resolve().parents[3]
 SOURCE, KEPT = ROOT / "reports/quoted.yaml", ROOT / "reports/tables"
 PACKAGE = {"accuracy/accuracy_front.csv": ROOT / "wrcore/run/accuracy_front.csv"}
-"""Kept tables that the package carries."""
+"""Paths of the kept tables that are part of the package wrcore."""
 
 NUMBER = r"([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 ROUNDING = 0.51
-"""Accepted deviation of a printed number, units of its last digit."""
+"""Accepted deviation of a printed number, in units of its last digit."""
 
 
 class Difference(NamedTuple):
-    """A number of a page that is not that of its table."""
+    """A number on a page that differs from its table."""
 
     page: str
     sentence: str
@@ -55,17 +55,17 @@ class Difference(NamedTuple):
 
 
 def read():
-    """Content of the list: ``sentences`` and ``tables``."""
+    """Return the content of ``reports/quoted.yaml``: ``sentences`` and ``tables``."""
     return yaml.safe_load(SOURCE.read_text("utf-8"))
 
 
 def kept_path(table):
-    """Where the copy of a table of the study is kept."""
+    """Return the path of the kept copy of a table of the study."""
     return PACKAGE.get(table, KEPT / table)
 
 
 def tables_of(entry):
-    """Paths, below the results, of all tables that an entry of the list reads."""
+    """Return the paths, below the results, of all tables that an entry of the list reads."""
     if "make" in entry:
         return list(page_tables.TABLES[entry["make"]].reads)
     found = []
@@ -77,7 +77,7 @@ def tables_of(entry):
 
 
 def numbers(value, entry, load):
-    """Numbers of a value of a sentence; ``load`` returns a table by its path."""
+    """Return the numbers for one value of a sentence; ``load`` returns a table by its path."""
     path = value.get("table", entry.get("table"))
     rows, where = load(path), value.get("where", {})
     if isinstance(where, str):
@@ -103,7 +103,9 @@ def numbers(value, entry, load):
 
 
 def last_digit(printed):
-    """Unit of the last digit of a printed number; zeros at the end of a whole number are not digits."""
+    """Return the unit of the last significant digit of a printed number.
+
+    Zeros at the end of a whole number are not significant."""
     mantissa, _, exponent = printed.lstrip("+-").partition("e")
     _, point, decimals = mantissa.partition(".")
     zeros = 0 if point else len(mantissa) - len(mantissa.rstrip("0")) if mantissa.strip("0") else 0
@@ -111,7 +113,7 @@ def last_digit(printed):
 
 
 def as_printed(number, printed):
-    """A number with the last digit of a printed one, or with two digits where that would leave none."""
+    """Return a number rounded to the last digit of a printed one, or to two digits if it is smaller than that."""
     unit = last_digit(printed)
     if abs(number) < unit and number != 0.0:
         return f"{float(f'{number:.2g}'):f}".rstrip("0").rstrip(".")
@@ -122,13 +124,13 @@ def as_printed(number, printed):
 
 
 def pattern(sentence):
-    """Regular expression of a sentence with ``#`` for numbers; any white space stands for any other."""
+    """Return the regular expression of a sentence with ``#`` for numbers; all white space is equivalent."""
     pieces = [r"\s+".join(map(re.escape, re.split(r"\s+", piece))) for piece in sentence.split("#")]
     return re.compile(NUMBER.join(pieces))
 
 
 def place(entry, text):
-    """Match of the sentence of an entry in the text of its page; LookupError if it does not stand there once."""
+    """Return the match of an entry's sentence in the text of its page; LookupError unless it occurs exactly once."""
     found = list(pattern(entry["says"]).finditer(text))
     if len(found) != 1:
         raise LookupError(f"{entry['page']}: {entry['says']!r} stands {len(found)} times")
@@ -136,7 +138,7 @@ def place(entry, text):
 
 
 def sentence_values(entry, load):
-    """Number and accepted relative deviation (None: as printed) for each ``#`` of a sentence."""
+    """Return number and accepted relative deviation (None: to the printed digits) for each ``#`` of a sentence."""
     pairs = []
     for value in entry["values"]:
         within = value.get("within", entry.get("within"))
@@ -147,7 +149,7 @@ def sentence_values(entry, load):
 
 
 def agrees(printed, found, within):
-    """Whether a printed number is that of a table."""
+    """Whether a printed number agrees with the number from a table."""
     if not np.isfinite(found):
         return False
     deviation = abs(float(printed) - found)
@@ -155,7 +157,7 @@ def agrees(printed, found, within):
 
 
 def block(text, head):
-    """Beginning and end of the Markdown table with a head in a text; LookupError if it is not there once."""
+    """Return begin and end of the Markdown table with this head in a text; LookupError unless it occurs once."""
     found = [match.start() for match in re.finditer(rf"^{re.escape(head)}$", text, re.MULTILINE)]
     if len(found) != 1:
         raise LookupError(f"table {head!r} stands {len(found)} times")
@@ -164,9 +166,9 @@ def block(text, head):
 
 
 def differences(entry, load, text):
-    """Differences of an entry of the list between the text of its page and the tables of ``load``.
+    """Return the differences between the text of an entry's page and the tables from ``load``.
 
-    Numbers of whole tables that depend on the machine (`PageTable.within`) are compared within that band.
+    In whole tables, numbers that depend on the machine may deviate by `PageTable.within`.
     """
     if "make" not in entry:
         match, name = place(entry, text), entry["says"]
@@ -194,7 +196,7 @@ def differences(entry, load, text):
 
 
 def written(entry, load, text):
-    """Text of a page with the numbers of the tables."""
+    """Return the text of a page with the numbers of the tables inserted."""
     if "make" in entry:
         made = page_tables.TABLES[entry["make"]].make(load)
         begin, end = block(text, made.splitlines()[0])
@@ -207,13 +209,13 @@ def written(entry, load, text):
 
 
 def entries():
-    """All entries of the list."""
+    """Return all entries of the list, sentences and tables."""
     content = read()
     return [*content["sentences"], *content["tables"]]
 
 
 def loader(path_of):
-    """Function that reads a table by its path below the results; FileNotFoundError if it is not there."""
+    """Return a function that reads a table by its path below the results; FileNotFoundError if there is no file."""
     read_before = {}
 
     def load(table):
@@ -225,7 +227,7 @@ def loader(path_of):
 
 
 def compare(path_of, progress=print):
-    """All differences of all pages, and how many entries had no table; prints them."""
+    """Print and return all differences of all pages, and return the number of entries without a table."""
     load, found, absent = loader(path_of), [], 0
     for entry in entries():
         text = (ROOT / entry["page"]).read_text("utf-8")
@@ -239,7 +241,7 @@ def compare(path_of, progress=print):
 
 
 def write(results):
-    """Keep the tables of a folder of results that pages quote, and write their numbers into the pages."""
+    """Copy the quoted tables of a folder of results to the kept tables, and write their numbers into the pages."""
     for entry in entries():
         for table in tables_of(entry):
             source, target = Path(results) / table, kept_path(table)
@@ -254,7 +256,7 @@ def write(results):
 
 
 def main(arguments=None):
-    """Command line; the exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("results", nargs="?", default="results", help="folder of the study's results")
     parser.add_argument("--write", action="store_true", help="write the numbers into the pages and keep the tables")

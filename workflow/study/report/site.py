@@ -1,7 +1,7 @@
-"""The report as plain pages in one reading order, for any browser, without a network and without scripts.
+"""The report as plain HTML pages in reading order, without network and scripts.
 
-A page per category of results: its answer first, then figures and tables with their captions, at the end the command
-that makes them again. Pictures stay where the study has written them.
+Each category of results has a page. It starts with the answer, continues with figures and tables with their captions,
+and ends with the command that reproduces them. Pages link to the pictures in the study's folders.
 """
 
 import os
@@ -17,7 +17,7 @@ from jinja2 import Environment, StrictUndefined
 from study.report.answers import ANSWERS
 
 MOST_ROWS = 12
-"""Of a table on a page; the file has the others."""
+"""Maximum number of rows of a table on a page; the file contains all rows."""
 
 STYLE = """
 body { font: 16px/1.45 sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem; color: #222; }
@@ -31,11 +31,10 @@ pre { background: #f4f4f4; padding: 0.6rem; overflow-x: auto; white-space: pre-w
 
 
 def write_site(items, results, config, captions):
-    """Write ``<results>/report/index.html`` and the pages that it leads to, which it returns in reading order;
-    ValueError for a category without an answer.
+    """Write ``<results>/report/index.html`` and its linked pages; return these pages in reading order.
 
-    ``items`` are what the rules mark for the report: rule, pattern (path, with wildcards), category, caption (file
-    below ``captions``), labels, params.
+    ``items`` are the outputs that rules mark for the report: rule, pattern (path with wildcards), category, caption
+    (file below ``captions``), labels, params. ValueError for a category without an answer.
     """
     results, captions = Path(results), Path(captions)
     unknown = sorted({item["category"] for item in items} - set(ANSWERS))
@@ -82,7 +81,7 @@ def _title(category):
 
 
 def _files(pattern):
-    """Existing files of a path with wildcards, each with their values."""
+    """Return the existing files of a path with wildcards, each with the values of the wildcards."""
     pieces = re.split(r"\{(\w+)[^}]*\}", pattern)
     shape = "".join(f"(?P<{p}>[^/]+)" if k % 2 else re.escape(p) for k, p in enumerate(pieces))
     found = sorted(Path().glob("".join("*" if k % 2 else p for k, p in enumerate(pieces))))
@@ -91,7 +90,7 @@ def _files(pattern):
 
 
 def _part(path, wildcards, item, folder, config, captions):
-    """A figure or table with its labels and its caption."""
+    """Return the HTML of a figure or table with its labels and its caption."""
     labels = ", ".join(str(value).format(**wildcards) for value in item["labels"].values())
     link = escape(Path(os.path.relpath(path, folder)).as_posix())
     stub = SimpleNamespace(params=SimpleNamespace(**_spaces(item["params"])), config=config,
@@ -109,7 +108,7 @@ def _part(path, wildcards, item, folder, config, captions):
 
 
 def _spaces(values):
-    """Mappings as objects with attributes, as captions read them."""
+    """Return mappings as objects with attributes, the form that captions need."""
     return {name: SimpleNamespace(**value) if isinstance(value, dict) and all(isinstance(k, str) for k in value)
             else value for name, value in values.items()}  # fmt: skip
 
@@ -121,7 +120,7 @@ def _table(path, link):
 
 
 def _command(items):
-    """What makes a page's results again: rules by name, those with wildcards by their files."""
+    """Return the command that reproduces a page's results: rules by name, or by their files if they have wildcards."""
     targets = dict.fromkeys(item["rule"] for item in items if "{" not in item["pattern"])
     targets |= dict.fromkeys(
         str(path) for item in items if "{" in item["pattern"] for path, _ in _files(item["pattern"])
