@@ -1,6 +1,6 @@
-"""The paper's figures, one function each, drawn from runs and from the real surfaces.
+"""The paper's figures, one function each, drawn from runs and from the surfaces of wheels and rails.
 
-Units change here and nowhere before: lengths to mm, angles to mrad, forces to kN.
+Values are converted from SI units only in this module: lengths to mm, angles to mrad, forces to kN.
 """
 
 import numpy as np
@@ -18,25 +18,27 @@ from wrcore.geometry.track import SIDES
 
 
 def _wheel_points(scene, side, u, s, **pose):
-    """Points of a wheel in the track frame for a pose x, y, z, roll, yaw, shape (..., 3), m."""
+    """Return points of a wheel in the track frame for given x, y, z, roll, yaw; shape (..., 3), m."""
     vehicle = scene.vehicle
     points = wheel_surface(scene.wheel, vehicle.rolling_radius, vehicle.half_distance, side, u, s)
     return wheelset_transform(points, **pose)
 
 
 def _rail_points(scene, side, u, x):
-    """Points of a rail in the track frame, shape (..., 3), m."""
+    """Return points of a rail in the track frame, shape (..., 3), m."""
     return rail_surface(scene.rail, scene.track, side, u, x)
 
 
 def _inside(curve, count, margin=1e-6):
-    """Lateral coordinates over a whole profile, m."""
+    """Return equally spaced lateral coordinates over a whole profile, m."""
     return np.linspace(curve.u[0] + margin, curve.u[-1] - margin, count)
 
 
 @styled
 def fig1_parametrisation(scene, point=(0.015, 0.22, -0.012, 0.07)):
-    """Fig. 1: surfaces of wheels and rails, their coordinates, and Q and P at u_w, s_w, u_r, s_r (m, rad, m, rad)."""
+    """Draw Fig. 1: surfaces of wheels and rails with their coordinates and the points Q and P.
+
+    ``point`` contains u_w, s_w of Q and u_r, s_r of P (m, rad, m, rad)."""
     figure = Figure(figsize=(6.8, 3.2))
     overview = figure.add_axes((-0.16, -0.45, 0.8, 1.8), projection="3d", computed_zorder=False)
     for side in ("right", "left"):
@@ -61,10 +63,10 @@ def _view(axes, x, y, z, zoom):
 
 
 def _wheel_on_rail(axes, scene, side, reach, angle, lift):
-    """Surfaces of one side: rail over -reach..reach (m) and wheel over -angle..angle (rad)."""
+    """Draw the surfaces of one side: the rail over -reach..reach (m) and the wheel over -angle..angle (rad)."""
     u, x = np.meshgrid(_inside(scene.rail, 50), np.linspace(-reach, reach, 12))
     rail = _rail_points(scene, side, u, x)
-    _surface(axes, rail.swapaxes(0, 1) if side == "left" else rail, "0.8", 1)  # normals up, for the light
+    _surface(axes, rail.swapaxes(0, 1) if side == "left" else rail, "0.8", 1)  # normals point up, for the lighting
     u, s = np.meshgrid(_inside(scene.wheel, 60), np.linspace(-angle, angle, 73))
     _surface(axes, _wheel_points(scene, side, u, s, z=scene.vehicle.rolling_radius + lift), "0.9", 2)
 
@@ -81,7 +83,7 @@ def _line(axes, points, **kwargs):
 
 
 def _coordinate_lines(axes, scene, side, point, lift):
-    """Profile and circle through Q on the wheel, profile and path through P on the rail."""
+    """Draw the profile and the circle through Q on the wheel, and the profile and the line through P on the rail."""
     u_w, s_w, u_r, s_r = point
     wheel = {"z": scene.vehicle.rolling_radius + lift}
     blue, red = {"color": LINES["planar"]["color"], "zorder": 5}, {"color": ACCENT, "zorder": 5}
@@ -106,7 +108,7 @@ def _axis_arrows(axes, length):
 
 @styled
 def fig2_profiles(wheel, rail, u_wheel=-0.034, u_rail=-0.030):
-    """Fig. 2: a point on the rail and one on the wheel profile (at u, m), with tangent, normal and slope angle."""
+    """Draw Fig. 2: a point on the rail and on the wheel profile (at u, m) with tangent, normal and slope angle."""
     figure = Figure(figsize=(6.8, 2.5), layout="constrained")
     rail_axes, wheel_axes = figure.subplots(1, 2)
     _profile_with_point(rail_axes, rail, u_rail, ("P", "u_r", "f_r"), up=1.0)
@@ -117,7 +119,7 @@ def fig2_profiles(wheel, rail, u_wheel=-0.034, u_rail=-0.030):
 
 
 def _profile_with_point(axes, curve, u, names, up):
-    """Profile, point, tangent and the normal that points out of the body (up for a rail, down for a wheel)."""
+    """Draw a profile with a point, its tangent and its outward normal (up for a rail, down for a wheel)."""
     name, across, height = names
     nodes = _inside(curve, 600)
     slope, f = float(curve(u, 1)), float(curve(u))
@@ -138,12 +140,11 @@ def _profile_with_point(axes, curve, u, names, up):
 
 @styled
 def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
-    """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose y (m)
-    and yaw (rad).
+    """Draw Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips.
 
-    The wheelset rests under a vertical ``load`` per wheel (N), which gives height and roll, ``lowered`` (m) further to
-    make the overlap visible; ``window`` is the half width of the view about the deepest contact points (m). ValueError
-    if there is no contact on this side.
+    The wheelset has the lateral position y (m) and yaw (rad). Its height and roll are those of rest under a vertical
+    ``load`` per wheel (N). It is drawn ``lowered`` (m) further to make the overlap visible. ``window`` is the half
+    width of the view about the deepest contact points (m). ValueError if there is no contact on this side.
     """
     geometry = scene.alike.geometry
     pose = _resting_pose(scene, geometry, y, yaw, load, lowered)
@@ -172,7 +173,7 @@ def _resting_pose(scene, geometry, y, yaw, load, lowered):
 
 
 def _wheel_span(scene, patches, window, count):
-    """Lateral wheel coordinates from ``window`` before the first to ``window`` after the last patch, m."""
+    """Return lateral wheel coordinates from ``window`` before the first to ``window`` after the last patch, m."""
     u = [patch.u_wheel_m for patch in patches]
     return np.linspace(max(min(u) - window, scene.wheel.u[0]), min(max(u) + window, scene.wheel.u[-1]), count)
 
@@ -186,16 +187,16 @@ def _cross_section(axes, scene, pose, side, patches, window):
     axes.fill_between(MM * y_wheel, MM * z_wheel, MM * z_rail, where=z_wheel < z_rail, color=ACCENT, alpha=0.5, lw=0)
     _mark(axes, [(patch.y_m, patch.z_m) for patch in patches], "planar")
     axes.set(xlabel="y / mm", ylabel="z / mm")
-    axes.set_aspect("equal", adjustable="datalim")  # a tread is flat: the panel keeps its height
+    axes.set_aspect("equal", adjustable="datalim")  # a tread is nearly flat; limits change, not the panel's size
 
 
 def _rail_below(scene, side, y):
-    """Height of the rail's surface at lateral positions y (m); NaN beside the rail."""
+    """Return the height of the rail's surface (m) at lateral positions y (m); NaN outside the rail."""
     return scene.rail(SIDES[side] * y - scene.track.rail_distance(scene.rail))
 
 
 def _plan_view(axes, scene, pose, side, found, window):
-    """Overlap over the wheel's surface, the deepest point of each strip and the contact points."""
+    """Draw the overlap over the wheel's surface, the deepest point of each strip and the contact points."""
     u = _wheel_span(scene, found["spatial"] + found["planar"], window, 300)
     s = np.linspace(-0.1, 0.1, 1001)
     points = _wheel_points(scene, side, *np.meshgrid(u, s), **pose)
@@ -223,8 +224,9 @@ def _mark(axes, points, detection):
 
 @styled
 def fig4_lateral_position(cases, horizons=None):
-    """Fig. 4: lateral position over time with planar and with spatial detection, runs by title of the panel and by
-    detection; prediction horizons (s, by title) are marked where given.
+    """Draw Fig. 4: lateral position over time with planar and with spatial detection.
+
+    ``cases`` contain runs by title of the panel and by detection. Prediction ``horizons`` (s, by title) are marked.
     """
     figure = Figure(figsize=(6.6, 0.9 + 1.6 * len(cases)), layout="constrained")
     panels = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
@@ -240,7 +242,7 @@ def fig4_lateral_position(cases, horizons=None):
 
 
 def _mark_horizon(axes, horizon, end):
-    """Shade the part in which neighbouring trajectories have separated."""
+    """Mark the prediction horizon and shade the time after it, when neighbouring trajectories have separated."""
     if horizon is not None and horizon < end:
         axes.axvline(horizon, color="0.3", linewidth=0.9, linestyle="-.", label="prediction horizon")
         axes.axvspan(horizon, end, color="0.93", linewidth=0, zorder=0)
@@ -248,8 +250,9 @@ def _mark_horizon(axes, horizon, end):
 
 @styled
 def fig5_contact_points(runs, wheel, rail, horizon=None, body="wheelset"):
-    """Fig. 5: where the contact points of runs by detection lie on rail and wheel profile, per side, over time and on
-    the profile; the prediction horizon (s) is marked where given.
+    """Draw Fig. 5: lateral positions of the contact points on rail and wheel, over time and on the profiles.
+
+    ``runs`` are by detection; each side has its own panels. The prediction ``horizon`` (s) is marked if given.
     """
     figure = Figure(figsize=(7.4, 5.4), layout="constrained")
     panels = figure.subplots(2, 4, width_ratios=(3, 1, 3, 1), sharey="row")

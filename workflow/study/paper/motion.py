@@ -1,17 +1,18 @@
-"""What pairs of runs say of the motion: flange contact, differences, how far ahead a run can be trusted."""
+"""Comparison of the motion in pairs of runs: flange contact, differences, and prediction horizon."""
 
 import numpy as np
 
 from wrcore.geometry.track import SIDES
 
 FLANGE_ANGLE = 0.7
-"""Contact angle from which a contact counts as flange contact, rad. S1002 on UIC60 at 1:40 jumps across this value:
-from the flange root to the flange, whose face stands at 1.22 rad (70 degrees)."""
+"""Minimum contact angle of flange contact, rad. For S1002 on UIC60 at 1:40 the contact jumps across this value: from
+the flange root to the flange, whose face is at 1.22 rad (70 degrees)."""
 
 
 def first_flange_contact(run, body="wheelset", angle=FLANGE_ANGLE):
-    """First output time (s) at which a wheelset has a patch of at least a contact angle (rad) on either side; NaN if
-    there is none.
+    """Return the first output time (s) at which a wheelset has flange contact on either side; NaN if there is none.
+
+    Flange contact is a patch whose contact angle is at least ``angle`` (rad).
     """
     steep = [np.nanmax(np.abs(_patches(run[f"{body}/{side}"].contact_angle_rad)), axis=1) >= angle for side in SIDES]
     when = np.flatnonzero(np.logical_or(*steep))
@@ -19,13 +20,14 @@ def first_flange_contact(run, body="wheelset", angle=FLANGE_ANGLE):
 
 
 def _patches(values):
-    """Channels of shape (n, patches) with NaN for an absent patch, as numbers that never win a maximum."""
+    """Return channels of shape (n, patches) with 0 in place of NaN, so that absent patches do not affect a maximum."""
     return np.where(np.isnan(values), 0.0, values)
 
 
 def difference(run, other, channel="y_m", group="wheelset", until=np.inf):
-    """Root mean square and maximum of the difference of two runs in a channel (n,), in its unit, over their common
-    output times up to ``until`` (s); ValueError if the output times differ.
+    """Return root mean square and maximum of the difference between two runs in a channel (n,), in its unit.
+
+    They are taken over the common output times up to ``until`` (s). ValueError if the output times differ.
     """
     t, gap = _gap(run, other, channel, group)
     gap = gap[t <= until]
@@ -40,8 +42,10 @@ def _gap(run, other, channel, group, sign=1.0):
 
 
 def prediction_horizon(run, twin, bound, channel="y_m", group="wheelset"):
-    """Last output time (s) up to which a run agrees in a channel (n,) with its twin, run to a tighter tolerance, within
-    a bound in the channel's unit; the end of the shorter run if it always does, NaN if they differ from the start.
+    """Return the last output time (s) up to which a run agrees with its twin, a run with a tighter tolerance.
+
+    They agree if the difference in a channel (n,) is within a bound, in the channel's unit. The result is the end of
+    the shorter run if they always agree, and NaN if they differ from the start.
     """
     t, gap = _gap(run, twin, channel, group)
     apart = np.flatnonzero(~(gap <= bound))
@@ -51,9 +55,9 @@ def prediction_horizon(run, twin, bound, channel="y_m", group="wheelset"):
 
 
 def mirror_defect(run, mirrored, until=np.inf, group="wheelset"):
-    """Largest |y + y'| between a run and the run started on the other side of the track, m.
+    """Return the maximum of |y + y'| (m) between a run and the run started on the other side of the track.
 
-    Zero for a program that treats left and right alike, as long as rounding has not been amplified.
+    It is zero for a program that is symmetric in left and right, as long as rounding errors are not amplified.
     """
     t, gap = _gap(run, mirrored, "y_m", group, sign=-1.0)
     return float(np.max(gap[t <= until]))

@@ -1,4 +1,4 @@
-"""The paper's tables: motion, timing, rigid contact geometry, and published values beside ours."""
+"""The paper's tables: motion, timing, rigid contact geometry, and comparison with published values."""
 
 import numpy as np
 import pandas as pd
@@ -12,15 +12,18 @@ from wrcore.run.simulate import simulate
 
 
 def horizons(cases, bound):
-    """Prediction horizons (s, by case) of the ``spatial`` runs that have a tighter twin (``spatial_tight``), for a
-    bound (m) of agreement in lateral position.
+    """Return the prediction horizons (s, by case) of the ``spatial`` runs with a tighter twin (``spatial_tight``).
+
+    ``bound`` (m) is the accepted difference of the lateral positions.
     """
     paired = {case: runs for case, runs in cases.items() if "spatial_tight" in runs}
     return {case: prediction_horizon(runs["spatial"], runs["spatial_tight"], bound) for case, runs in paired.items()}
 
 
 def motion_row(run, body="wheelset"):
-    """What a run shows, a table's row: frequency, wavelength and growth are those before the first flange contact."""
+    """Return the row of a run in the table of motion.
+
+    Frequency, wavelength and growth are determined before the first flange contact."""
     flange = first_flange_contact(run, body)
     early = run.t <= (np.inf if np.isnan(flange) else flange)
     y = run[body].y_m
@@ -38,12 +41,12 @@ def motion_row(run, body="wheelset"):
 
 
 def motion_table(cases, bound):
-    """One row per case and detection: how the wheelset moves, and how planar and spatial compare.
+    """Return the table of motion and of the difference between planar and spatial, one row per case and detection.
 
-    Runs are ``planar``, ``spatial`` and, where run, ``spatial_tight`` (tighter tolerances) and ``spatial_mirrored``
-    (started on the other side of the track). Frequency and growth count up to the first flange contact, the difference
-    between planar and spatial and the mirror defect up to the prediction horizon for a bound (m), or over the whole run
-    where there is no twin.
+    Runs are ``planar``, ``spatial`` and optionally ``spatial_tight`` (tighter tolerances) and ``spatial_mirrored``
+    (started on the other side of the track). Frequency and growth are determined before the first flange contact. The
+    difference between planar and spatial and the mirror defect are determined up to the prediction horizon for a bound
+    (m), or over the whole run without a twin.
     """
     horizon = horizons(cases, bound)
     rows = []
@@ -63,11 +66,11 @@ def motion_table(cases, bound):
 
 
 def time_runs(cases, repetitions):
-    """Time runs with ``planar`` and ``spatial`` detection in pairs: the samples that `timing_table` takes.
+    """Measure the time of runs with ``planar`` and ``spatial`` detection in pairs; return samples for `timing_table`.
 
     ``cases`` maps a case to a function of the detection and the repetition (from 1) that returns the scene. Each
     repetition may start from another state, so that the scatter contains that of the motion. The first run of a pair
-    alternates. One pair before the first repetition loads compiled kernels and caches and is left out.
+    alternates. One pair before the first repetition loads compiled kernels and caches and is not recorded.
     """
     rows = []
     for case, scene_of in cases.items():
@@ -83,13 +86,15 @@ def time_runs(cases, repetitions):
 
 
 RIGID_LOAD = 1e-3
-"""Wheel load at which the wheelset counts as rigid, N: the approach is then below a nanometre."""
+"""Wheel load at which the wheelset is regarded as rigid, N. The penetration is then below 1 nm."""
 
 
 def rigid_contact(geometry, shifts, detection="planar"):
-    """Rigid contact geometry of a wheelset at lateral positions (n,), m, without load and yaw, with roll, what a
-    conicity study starts from: y_m, roll_rad, lowering_m (of its centre below the nominal radius), radius_difference_m
-    (left less right) and, of each side's most loaded patch, u_wheel, u_rail (m) and contact angle (rad).
+    """Return the table of rigid contact geometry of a wheelset at lateral positions (n,), m, without yaw.
+
+    It is the basis of conicity. Columns are y_m, roll_rad, lowering_m (of the centre below the nominal radius) and
+    radius_difference_m (left minus right). For each side's most loaded patch they are u_wheel, u_rail (m) and contact
+    angle (rad).
     """
     poses = pd.DataFrame(
         {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
@@ -117,7 +122,7 @@ def rigid_contact(geometry, shifts, detection="planar"):
 
 
 def geometry_table(scene, y):
-    """Rigid contact geometry (:func:`rigid_contact`) of a scene's wheelset at lateral positions y (m)."""
+    """Return the rigid contact geometry (:func:`rigid_contact`) of a scene's wheelset at lateral positions y (m)."""
     return rigid_contact(scene.alike.geometry, y, scene.detection)
 
 
@@ -126,15 +131,15 @@ RATIOS = {"per_run": "wall_s", "per_call": "us_per_call", "of_calls": "rhs_evalu
 of evaluations."""
 
 SPREAD = {"": "median", "_least": "min", "_largest": "max"}
-"""Ends of the columns of a ratio, and what of all pairs they hold."""
+"""Endings of the columns of a ratio, and the statistic over all pairs in each column."""
 
 
 def timing_table(samples):
-    """Cost per run and per evaluation of the right-hand side: medians over the repetitions of `time_runs`.
+    """Return the cost per run and per evaluation of the right-hand side: medians over the repetitions of `time_runs`.
 
     ``ratio_per_run``, ``ratio_per_call`` and ``ratio_of_calls`` (`RATIOS`) are medians of the paired ratios planar /
-    spatial, those with ``_least`` and ``_largest`` the extremes of all pairs; equal in both rows of a case. Planar and
-    spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
+    spatial. Columns with ``_least`` and ``_largest`` are minimum and maximum of all pairs. Both rows of a case have the
+    same ratios. Planar and spatial runs of one repetition follow each other, so that the machine's load affects both.
     """
     samples = samples.assign(us_per_call=1e6 * samples["wall_s"] / samples["rhs_evaluations"])
     columns = ["simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected", "us_per_call"]
@@ -151,9 +156,11 @@ def timing_table(samples):
 
 
 def comparison_table(reference, ours):
-    """Reference values (quantity, unit, value, tolerance: absolute, empty where a value is only shown, source) beside
-    ours by quantity, with the columns ours, ours_least and ours_largest (of repeated measurements) and within (yes, no,
-    or empty without a tolerance or a value of ours). A quantity of ours is a number, or median, least and largest.
+    """Return a table that compares reference values with the values of this study.
+
+    ``reference`` has the columns quantity, unit, value, tolerance (absolute; empty for values without a check) and
+    source. ``ours`` contains, by quantity, a number or median, minimum and maximum. Added columns are ours, ours_least
+    and ours_largest (of repeated measurements) and within (yes, no, or empty without a tolerance or a value).
     """
     table = reference.copy()
     found = [np.atleast_1d(ours.get(quantity, np.nan)) for quantity in table["quantity"]]
@@ -174,9 +181,10 @@ TIMED = {
 
 
 def our_values(geometry, motion, timing, case):
-    """Our side of the comparison with published values, by the quantity's name in the reference table, for the paper's
-    case: from contact geometry over the lateral position, `motion_table` and `timing_table`; ratios of timed pairs with
-    their least and largest.
+    """Return the study's values for the comparison with published values, by the quantity's name in that table.
+
+    They are values of the paper's case from contact geometry over the lateral position, `motion_table` and
+    `timing_table`. Ratios of timed pairs have median, minimum and maximum.
     """
     run = motion[(motion["case"] == case) & (motion["detection"] == "spatial")].iloc[0]
     cost = timing[timing["case"] == case].iloc[0]
