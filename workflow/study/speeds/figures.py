@@ -1,4 +1,4 @@
-"""Figures of vehicles: motion of all wheelsets, guiding forces, and what changes with speed.
+"""Figures of vehicles: motion of all wheelsets, guiding forces, and results over speed.
 
 Units, colours and the difference between planar and spatial are those of :mod:`wrcore.analysis.pictures.style`.
 """
@@ -20,25 +20,27 @@ VEHICLES = (
     {"marker": "s", "markersize": 3.5, "markerfacecolor": "white"},
     {"marker": "^", "markersize": 4.0, "markerfacecolor": "white"},
 )
-"""Markers of the vehicles that one figure compares, in order."""
+"""Markers of the vehicles in a figure, in order."""
 
 CRITICAL = ({"linestyle": "-."}, {"linestyle": ":"})
-"""Lines at the linear critical speeds of those vehicles."""
+"""Line styles of the linear critical speeds of the vehicles in a figure, in order."""
 
 SWINGS = 10
-"""Oscillations of the leading wheelset that its motion is drawn for: more would run together."""
+"""Number of oscillations of the leading wheelset in a figure of motion. With more, the lines would merge."""
 
 LAST = 4.0
-"""Time at the end of a run that forces are drawn for, s."""
+"""Duration at the end of a run for which forces are drawn, s."""
 
 WIDE = (20.0, 1e5)
-"""Values whose largest and smallest differ by a factor between these are drawn on a logarithmic axis."""
+"""Range of the ratio of maximum to minimum value for which an axis is logarithmic."""
 
 
 @styled
 def lateral_motion(runs):
-    """Lateral position of every wheelset over time, runs by title of the column, one per speed, and by detection: the
-    first `SWINGS` oscillations of the leading wheelset; the title says so where the run goes on.
+    """Draw the lateral position of every wheelset over the first `SWINGS` oscillations of the leading wheelset.
+
+    ``runs`` are by title of the column, one per speed, and by detection. The title contains the drawn time if the run
+    is longer.
     """
     names = wheelsets_of(next(iter(next(iter(runs.values())).values())))
     figure = Figure(figsize=(0.6 + 3.1 * len(runs), 1.1 + 1.15 * len(names)), layout="constrained")
@@ -60,7 +62,7 @@ def lateral_motion(runs):
 
 
 def _swings(run, wheelset):
-    """Time that `SWINGS` oscillations of a wheelset take, and that of the whole run, s."""
+    """Return the time of `SWINGS` oscillations of a wheelset and the time of the whole run, s."""
     frequency, _, _ = hunting(run.t, run[wheelset].y_m)
     whole = float(run.t[-1])
     return (min(SWINGS / frequency, whole) if frequency > 0.0 else whole), whole
@@ -68,8 +70,9 @@ def _swings(run, wheelset):
 
 @styled
 def guiding_forces(run, title, critical=None):
-    """Vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run; the title says on
-    which side of the vehicle's linear critical speed (m/s) it is.
+    """Draw vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run.
+
+    The title states whether the speed is below or above the vehicle's linear ``critical`` speed (m/s).
     """
     names = wheelsets_of(run)
     figure = Figure(figsize=(7.2, 0.9 + 1.35 * len(names)), layout="constrained")
@@ -99,7 +102,7 @@ HUNTING = (
     ("frequency_Hz", 1.0, "hunting frequency / Hz"),
     ("damping_ratio", 1.0, "damping ratio"),
 )
-"""Column, factor to the printed unit, and label."""
+"""Columns of the figure of hunting: name, factor to the printed unit, and label."""
 
 RESPONSE = (
     ("Y_over_Q_max", 1.0, "largest Y/Q"),
@@ -113,9 +116,10 @@ RESPONSE = (
 
 @styled
 def over_speed(tables, track, quantities, critical=None):
-    """Results of a sweep over speed (`speed_table` by vehicle) on one track, planar and spatial, a panel for each
-    (column, factor, label) of ``HUNTING`` or ``RESPONSE``; runs that derailed are crosses at the top. Linear critical
-    speeds (m/s) are marked, as runs beyond them hunt whatever the track.
+    """Draw the results of a sweep over speed (`speed_table` by vehicle) on one track, planar and spatial.
+
+    Each (column, factor, label) of ``HUNTING`` or ``RESPONSE`` has a panel. Derailed runs are crosses at the top.
+    Linear critical speeds (m/s) are marked, because vehicles hunt above them on any track.
     """
     rows = -(-len(quantities) // 3)
     figure = Figure(figsize=(7.6, 0.7 + 2.2 * rows), layout="constrained")
@@ -124,7 +128,7 @@ def over_speed(tables, track, quantities, critical=None):
         for marker, (vehicle, table) in zip(VEHICLES, tables.items(), strict=False):
             for detection, line in LINES.items():
                 part = table[(table["track"] == track) & (table["detection"] == detection)]
-                values = factor * part[column].where(part["status"] == "completed")  # a gap is not bridged
+                values = factor * part[column].where(part["status"] == "completed")  # no line across missing values
                 if values.notna().any():
                     style = {**line, **marker, "markevery": 2}
                     axes.plot(part["speed_m_per_s"], values, label=f"{vehicle}, {detection}", **style)
@@ -140,7 +144,7 @@ def over_speed(tables, track, quantities, critical=None):
 
 
 def _wide(axes):
-    """Whether small values of a panel would be lost beside its large ones, and all are above zero."""
+    """Whether all values of a panel are positive and their ratio of maximum to minimum is in the range `WIDE`."""
     drawn = [line.get_ydata() for line in axes.lines if line.get_transform() == axes.transData]
     values = np.concatenate([[], *drawn])
     values = values[np.isfinite(values)]

@@ -1,4 +1,4 @@
-"""Sweeps over speed: many runs of one vehicle in one process, which share imports, kernels and creep table."""
+"""Sweeps over speed: many runs of one vehicle in one process with common imports, kernels and creep table."""
 
 from wrcore.run.simulate import simulate_many
 from wrcore.scene.description import load_scene
@@ -8,8 +8,10 @@ CHANNELS = "output.channels=[pose, velocity, acceleration, contact]"
 
 
 def sweep_speeds(source, overrides, speeds, tracks, progress=None):
-    """Run a scene at several speeds (m/s) on several tracks (further changes to the scene by name), planar and spatial:
-    runs by detection and track, in the order of the speeds; ``progress`` wraps the scenes.
+    """Run a scene at several speeds (m/s) on several tracks with planar and spatial detection.
+
+    ``tracks`` are further changes to the scene, by name. Returns runs by detection and track, in the order of the
+    speeds. ``progress`` wraps the scenes.
     """
     keys = [(detection, track) for detection in DETECTIONS for track in tracks]
     scenes = [

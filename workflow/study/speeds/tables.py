@@ -1,4 +1,4 @@
-"""Vehicles over speed: a row for each run, and what the runs cost."""
+"""Tables of vehicles over speed: a row for each run, and the cost of the runs."""
 
 import numpy as np
 import pandas as pd
@@ -7,15 +7,16 @@ from wrcore.analysis.assessment.wheels import wheel_table, wheelsets_of
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 
 SMALLEST = 1e-6
-"""Motions below this are not asked for a frequency or a damping, m."""
+"""Amplitude below which frequency and damping of a motion are not determined, m."""
 
 OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "growth_per_s", "damping_ratio"}
-"""Columns that a run has, too, which ended early."""
+"""Columns that are also determined for runs that ended early."""
 
 
 def hunting(t, y):
-    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion y (m) over t (s)
-    from release on; NaN once the motion has died before it has swung.
+    """Return frequency (Hz), growth (1/s) and damping ratio of a lateral motion y (m) over t (s) after release.
+
+    The motion may decay, be steady or grow. Results are NaN if it ends before it has oscillated.
     """
     swinging = np.flatnonzero(np.abs(y) > SMALLEST)
     end = swinging[-1] + 1 if swinging.size else 0
@@ -24,9 +25,11 @@ def hunting(t, y):
 
 
 def speed_row(run, begin=0.5, body="car_body"):
-    """What one run of a sweep over speeds shows, with forces, amplitude and ride over the part after ``begin`` (of 1),
-    accelerations of a body where the vehicle has it, and hunting of the leading wheelset over the whole run. A run that
-    did not reach its end (``status``) has no late part: what would be measured there is NaN.
+    """Return the row of one run in the table of a sweep over speeds.
+
+    Forces, amplitude and accelerations are from the part of the run after ``begin`` (fraction of its duration), hunting
+    of the leading wheelset from the whole run. Accelerations are NaN if the vehicle has no such body. If the run ended
+    early (``status``), only the columns `OF_WHOLE_RUNS` are not NaN.
     """
     leading, whole = wheelsets_of(run)[0], run.status == "completed"
     start = begin * run.scene["integration"]["duration"] if whole else 0.0
@@ -61,7 +64,9 @@ def speed_row(run, begin=0.5, body="car_body"):
 
 
 def speed_table(runs):
-    """Rows of :func:`speed_row` for runs ``{(detection, track): [run, ...]}``, detection and track in front."""
+    """Return the table of :func:`speed_row` for runs ``{(detection, track): [run, ...]}``.
+
+    Its first columns are detection and track."""
     return pd.DataFrame(
         [
             {"detection": detection, "track": track} | speed_row(run)
@@ -72,8 +77,10 @@ def speed_table(runs):
 
 
 def cost_table(tables, job_seconds):
-    """Cost of sweeps over speed (`speed_table` by vehicle), planar against spatial, and what of each vehicle's job
-    (``job_seconds``, of its whole process) is not integration: a row per vehicle, track and detection.
+    """Return the cost of sweeps over speed (`speed_table` by vehicle), a row per vehicle, track and detection.
+
+    Spatial is compared with planar detection. The time of each vehicle's job that is not integration is computed from
+    ``job_seconds``, the time of its whole process.
     """
     rows = []
     for vehicle, table in tables.items():

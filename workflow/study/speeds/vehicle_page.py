@@ -1,11 +1,11 @@
-"""The vehicle files as one page to read: each value with the comment that says where it is from."""
+"""One HTML page with all vehicle files: each value with the comment that states its source."""
 
 import html
 import re
 from pathlib import Path
 
 MARKS = ("RECALLED", "CHOSEN")
-"""Words in a vehicle file's comments that tell a value without a published source."""
+"""Words in a vehicle file's comments that mark a value without a published source."""
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Vehicle values and their sources</title>
@@ -19,7 +19,7 @@ _PAGE = """<!DOCTYPE html>
 
 
 def vehicle_page(paths):
-    """HTML page with the whole content of vehicle files, the marks of unpublished values set off."""
+    """Return an HTML page with the whole content of vehicle files; the words of `MARKS` are highlighted."""
     parts = []
     for path in map(Path, paths):
         text = html.escape(path.read_text(encoding="utf-8"), quote=False)

@@ -1,1 +1,1 @@
-"""Many short runs in one table."""
+"""Sweeps: many short runs with results in one table."""

@@ -1,4 +1,4 @@
-"""Figures of sweeps: a measure of every run over each key that was varied."""
+"""Figures of sweeps: a result of every run over each varied key of the scene."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ ENDS: dict[str, dict[str, Any]] = {
     "stalled": {"color": "0.5", "marker": "^", "s": 14, "linewidths": 0},
     "failed": {"color": "0.1", "marker": "+", "s": 20, "linewidths": 0.8},
 }
-"""How a run that ended so is drawn."""
+"""Marker styles of runs by their status at the end."""
 
 MOST_COLUMNS = 3
 FEW = 300
-"""Points of smaller sweeps are drawn larger."""
+"""Number of runs below which points are drawn larger."""
 
 
 @styled
 def sweep_scatter(table: pd.DataFrame, keys: list[str], measure: str) -> Figure:
-    """One measure of all runs of a sweep's table over each key, a panel per key; words stand side by side."""
+    """Draw one result of all runs of a sweep's table over each key, a panel per key; text values are categories."""
     columns = min(MOST_COLUMNS, len(keys))
     rows = -(-len(keys) // columns)
     figure = Figure(figsize=(0.8 + 2.4 * columns, 0.6 + 2.3 * rows), layout="constrained")
@@ -52,7 +52,7 @@ def _over(axes: Axes, table: pd.DataFrame, key: str, values: np.ndarray) -> None
         places, label = _printed(key, table[key])
     else:
         codes, names = pd.factorize(table[key].astype(str))
-        spread = (np.arange(len(table)) % 29 - 14) / 50  # side by side, for what would lie on one line
+        spread = (np.arange(len(table)) % 29 - 14) / 50  # spreads runs of one category laterally
         places, label = codes + spread, key.rpartition(".")[2]
         axes.set_xticks(range(len(names)), [_short(name) for name in names])
     for end, style in ENDS.items():
@@ -64,12 +64,12 @@ def _over(axes: Axes, table: pd.DataFrame, key: str, values: np.ndarray) -> None
 
 
 def _short(name: str) -> str:
-    """A word, or a file's name without folder and ending, in lines."""
+    """Return a text, or a file's name without folder and ending, broken into lines at underscores."""
     return PurePath(name).stem.replace("_", "\n") if "/" in name and name.endswith((".yaml", ".csv")) else name
 
 
 def _printed(column: str, values: pd.Series) -> tuple[np.ndarray, str]:
-    """Values in the unit that is printed, and the label."""
+    """Return the values in the printed unit, and the label."""
     unit = column_unit(column)
     name = column.removeprefix("contact.").removeprefix("integration.").replace(".", " ")
     for end in ("_m", "_rad", "_N"):
