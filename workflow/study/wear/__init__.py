@@ -1,1 +1,1 @@
-"""What a distance does to wheel profiles, and what settings and models do to that."""
+"""Wear of wheel profiles over a distance, and the influence of settings and models on it."""

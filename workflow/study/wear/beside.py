@@ -1,7 +1,7 @@
-"""Two folders of ``wrcore evolve`` at the same distances: ``python -m study.wear.beside A B [--km 1e4 2e4]``.
+"""Compare two folders of ``wrcore evolve`` at equal distances: ``python -m study.wear.beside A B [--km 1e4 2e4]``.
 
-Prints a row per distance and folder, profiles and table between steps in proportion, and by how much the profiles
-differ at most where treads and where flanges wear, beside the deepest place of the second one there.
+Prints a row per distance and folder; profiles and tables are interpolated linearly between steps. For tread and flange
+it also prints the maximum difference of the profiles and the maximum wear of the second folder.
 """
 
 import argparse
@@ -13,15 +13,17 @@ import pandas as pd
 from wrcore.analysis.wear.evolve import profiles_over_distance
 
 FLANGE = -0.03
-"""The flange and its root lie below this place on the profile, m; the tread up to the same on the field side."""
+"""Limit between flange (with its root) and tread on the profile, m. The tread is evaluated up to the opposite value on
+the field side."""
 
 SHOWN = {"Sh_m": (1e3, 2), "Sd_m": (1e3, 2), "qR_m": (1e3, 2), "hollow_m": (1e3, 2), "equivalent_conicity": (1.0, 3)}
-"""Columns: scale and decimals."""
+"""Printed columns with their scale and number of decimals."""
 
 
 def worn_by(folder, distance):
-    """Places u (m), what the ordinate has risen by since the start of the folder (m), and the table's numbers, at a
-    distance (m) before the wheel was turned; nothing beyond that."""
+    """Return positions u (m), change of the ordinates since the start (m), and the table's numbers at a distance (m).
+
+    Return None for distances beyond the first reprofiling of the wheel."""
     table, profiles = pd.read_csv(Path(folder) / "steps.csv"), profiles_over_distance(folder)
     turned = np.flatnonzero(table["at_limit"])
     count = turned[0] + 1 if len(turned) else len(table)
@@ -36,7 +38,7 @@ def worn_by(folder, distance):
 
 
 def main():
-    """Print the table."""
+    """Run the command that prints the comparison."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs=2)
     parser.add_argument("--km", nargs="+", type=float, default=[10_000, 20_000, 30_000, 40_000, 50_000])

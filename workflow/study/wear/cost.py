@@ -1,4 +1,4 @@
-"""What a long distance costs, from its beginning: ``python -m study.wear.cost config/wear/trailer_vehicle.yaml``."""
+"""Cost of a long distance, extrapolated: ``python -m study.wear.cost config/wear/trailer_vehicle.yaml``."""
 
 import argparse
 import time
@@ -9,11 +9,11 @@ import pandas as pd
 from wrcore.analysis.wear.evolve import evolve
 
 WHOLE = 1e8
-"""m."""
+"""Distance to which the cost is extrapolated, m."""
 
 
 def cost_table(plan, distance, whole=WHOLE, threads=1):
-    """How the cost of a distance (m) of a plan splits, and what the whole (m) would cost at the same rate.
+    """Return the cost of a distance (m) of a plan by its parts, extrapolated to the distance ``whole`` (m).
 
     Rows ``simulate`` (all runs), ``wear`` (their local wear), ``rest`` (smoothing, profiles, conicity, files) and
     ``all``: cpu_s (processor time), share, extrapolated_cpu_h of the whole; wall_s and steps of all.
@@ -33,7 +33,7 @@ def cost_table(plan, distance, whole=WHOLE, threads=1):
 
 
 def main():
-    """Print the table."""
+    """Run the command that prints the table of costs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("plan", metavar="PLAN.yaml")
     parser.add_argument("--distance", type=float, default=2e7, metavar="m")

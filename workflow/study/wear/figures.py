@@ -1,4 +1,4 @@
-"""What settings and models do to worn wheel profiles. Units change here: m to mm and km."""
+"""Figures of the influence of settings and models on worn wheel profiles. Lengths are converted to mm and km here."""
 
 from matplotlib.figure import Figure
 
@@ -10,7 +10,7 @@ LOOKS = ("k-", "C0--", "C1-.", "C2:", "C3--", "C4-.", "C5:", "C6-", "C7--")
 
 @styled
 def fig_influences(found, distance):
-    """Depth over the profile (u and depth, m, by name) for each setting and model at a distance (m)."""
+    """Draw the wear depth over the profile (u and depth, m, by name) for each setting and model at a distance (m)."""
     figure = Figure(figsize=(6.8, 4.6), layout="constrained")
     axes, worn = figure.subplots(), []
     for (name, (u, depth)), look in zip(found.items(), LOOKS * (1 + len(found) // len(LOOKS)), strict=False):

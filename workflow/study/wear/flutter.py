@@ -1,9 +1,9 @@
-"""Whether a worn wheel flutters on a worn rail: ``python -m study.wear.flutter FOLDER STEP [--scene 5]``.
+"""Flutter of a worn wheel on a worn rail: ``python -m study.wear.flutter FOLDER STEP [--scene 5]``.
 
-A scene of a plan runs with ``moment`` on the wheels and rails that ``wrcore evolve PLAN --out FOLDER`` has at the start
-of a step, and goes on from there with each patch model. Prints of the first wheelset's wheels how many patches carry,
-how often a second their number changes, and of the resultant of their normal forces its mean size and angle, how much
-both go to and fro, and how often a second the angle rises through its mean.
+A scene of a plan runs with ``moment`` on the wheels and rails of ``wrcore evolve PLAN --out FOLDER`` at the start of a
+step, and continues with each patch model. For the first wheelset's wheels the command prints the number of loaded
+patches and the rate of its changes. For the resultant of the normal forces it prints mean and standard deviation of
+size and angle, and how often per second the angle rises through its mean.
 """
 
 import argparse
@@ -22,13 +22,15 @@ from wrcore.scene.description import load_scene
 
 
 def flutter(t, normal, angle):
-    """Mean number of patches, changes of it (1/s), mean and standard deviation of the resultant normal force (N) and of
-    its angle (rad), and how often that rises through its mean (1/s), from times (n,), s, normal forces (n, m), N, and
-    contact angles (n, m), rad, of a wheel's patches; NaN: none."""
+    """Return the measures of flutter of a wheel from times (n,), s, normal forces (n, m), N, and contact angles (n, m),
+    rad, of its patches (NaN for absent patches).
+
+    They are mean number of patches, its changes (1/s), mean and standard deviation of the resultant normal force (N)
+    and of its angle (rad), and the rate (1/s) at which the angle rises through its mean."""
     force, angle = np.nan_to_num(normal), np.nan_to_num(angle)
     across, up = (force * np.sin(angle)).sum(axis=1), (force * np.cos(angle)).sum(axis=1)
     count, size, turned = (force > 0.0).sum(axis=1), np.hypot(across, up), np.arctan2(across, up)
-    turned *= np.copysign(1.0, turned.mean())  # of left and right wheels alike
+    turned *= np.copysign(1.0, turned.mean())  # equal sign for left and right wheels
     above, whole = turned > turned.mean(), t[-1] - t[0]
     rises = np.count_nonzero(above[1:] & ~above[:-1]) / whole
     changes = np.count_nonzero(np.diff(count)) / whole
@@ -36,7 +38,7 @@ def flutter(t, normal, angle):
 
 
 def worn_scene(plan, folder, step, place, changes):
-    """Scene of a plan, by its place, on the wheels and rails of the start of a step."""
+    """Return the scene with the index ``place`` of a plan, on the wheels and rails at the start of a step."""
     _, scenes = load_wear_plan(plan, {"set": changes, "rate": 1000.0})
     if not 0 <= place < len(scenes):
         raise InputError(plan, "scenes", f"expected a scene from 0 to {len(scenes) - 1}, got {place}")

@@ -1,4 +1,4 @@
-"""Influences on worn profiles: each setting and model against the finest, with what it costs."""
+"""Influences on worn profiles: each setting and model compared with the finest, and its cost."""
 
 import time
 
@@ -9,21 +9,20 @@ from wrcore.analysis.wear.evolve import evolve, load_wear_plan, profiles_over_di
 from wrcore.analysis.wear.worn_profiles import POINTS
 
 SEEDS = 100
-"""Further copies of a scene have seeds that differ by multiples of this."""
+"""Difference of the seeds of successive copies of a scene."""
 
 
 def variant_changes(variant, distance):
-    """Changes of a plan over a distance (m) for a variant of the configuration; its ``set`` comes after that of its
-    ``plan``.
+    """Return the changes of a plan over a distance (m) for a variant of the configuration.
+
+    The variant's ``set`` overrides the ``set`` of its ``plan``.
     """
     changes = {"distance": distance, **variant.get("plan", {})}
     return changes | {"set": changes.get("set", {}) | variant.get("set", {})}
 
 
 def with_copies(plan, copies):
-    """Changes of a plan that put copies of each scene (so many in all) on other irregularities of its kind beside
-    it.
-    """
+    """Return changes of a plan that replace each scene by ``copies`` scenes on different irregularities."""
     scenes = []
     for part in plan["scenes"]:
         for k in range(copies):
@@ -37,8 +36,9 @@ def with_copies(plan, copies):
 
 
 def variant_depth(source, changes, folder, copies=1):
-    """Depth that a plan with changes, and copies as for `with_copies`, takes off a wheel: u and depth (m), table of
-    `evolve`, and processor time (s).
+    """Return the wear of a wheel by a plan with changes: u and depth (m), table of `evolve`, and processor time (s).
+
+    ``copies`` are those of `with_copies`.
     """
     plan, _ = load_wear_plan(source, changes)
     if copies > 1:
@@ -51,9 +51,10 @@ def variant_depth(source, changes, folder, copies=1):
 
 
 def influence_table(found):
-    """Worn profiles of `variant_depth` by name beside the first of them: deepest loss (m), area of the loss (m^2),
-    largest deviation from the first one's depth and that of the area, both over the first one's, conicity at the end,
-    steps, processor time (s).
+    """Return a table that compares worn profiles of `variant_depth`, by name, with the first of them.
+
+    Columns are maximum depth (m), worn area (m^2), maximum deviation of the depth and deviation of the area, both
+    relative to the first profile, conicity at the end, steps, and processor time (s).
     """
     u, first, _, _ = next(iter(found.values()))
     rows = []

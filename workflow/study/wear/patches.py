@@ -1,8 +1,9 @@
-"""What ellipses err by in local wear: ``python -m study.wear.patches FOLDER [PLAN] [--resolution middle]``.
+"""Errors of ellipses in local wear: ``python -m study.wear.patches FOLDER [PLAN] [--resolution middle]``.
 
-Each scene of a plan (config/wear/main_line.yaml) runs on its new wheels with contact that is looked up; what the first
-wheelset's wheels lose is found over the ellipses of equal moments and over the exact patches of the same motion, and
-over the exact patches of the motion of ellipses. Prints a row per scene and wheel, and draws the depths.
+Each scene of a plan (config/wear/main_line.yaml) runs on its new wheels, once with contact from the lookup table
+(``tabulated``) and once with ellipses (``moment``). Wear of the first wheelset's wheels is computed in three ways
+(`WAYS`): over ellipses and over exact patches of the first motion, and over exact patches of the second motion. The
+command prints a row per scene and wheel, and draws the depths.
 """
 
 import argparse
@@ -20,21 +21,21 @@ from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
 WIDTH = 5e-4
-"""Of the bins, m."""
+"""Width of the bins of the profile, m."""
 U = WIDTH * np.arange(-120, 80)
-"""Places on a wheel's profile, m."""
+"""Positions on a wheel's profile at which depths are compared, m."""
 WAYS = {**{patches: patches for patches in PATCHES}, "exact, on the motion of ellipses": "exact"}
-"""In which wear is found: the patches of each."""
+"""Ways of computing wear, with the contact patches of each."""
 
 
 def depths(wear):
-    """Depth (m per m) over `U`."""
+    """Return the wear depth at the positions `U`, m per m of distance."""
     middles = 0.5 * (wear.wheel_edges[1:] + wear.wheel_edges[:-1])
     return np.interp(U, middles, wear.wheel_depth, 0.0, 0.0)
 
 
 def compared(scene, begin, law, resolution):
-    """Of both wheels of the first wheelset, by way (`WAYS`): depths, volume (m^3/m), processor time (s)."""
+    """Return, by way (`WAYS`), depths, volume (m^3/m) and processor time (s) for both wheels of the first wheelset."""
     found, elsewhere = {}, load_scene(scene, {"contact.patch": "moment"})
     runs = simulate(scene), simulate(elsewhere)
     assert all(run.status == "completed" for run in runs), [run.reason for run in runs]
@@ -49,7 +50,7 @@ def compared(scene, begin, law, resolution):
 
 @styled
 def figure_of(found):
-    """Depths over the profile, a row per scene, left and right wheel."""
+    """Draw the depths over the profile, a row per scene, for the left and the right wheel."""
     figure = Figure(figsize=(7.2, 1.7 * len(found)), layout="constrained")
     rows = figure.subplots(len(found), 2, squeeze=False, sharex=True)
     for axes, (name, ways) in zip(rows, found.items(), strict=True):

@@ -1,4 +1,4 @@
-"""The study's creep table, for wear plans."""
+"""Use of the study's creep table in wear plans."""
 
 import os
 
@@ -7,8 +7,9 @@ from wrcore.analysis.wear.evolve import load_wear_plan
 
 
 def plan_with_creep_table(plan, changes, table):
-    """Changes of a wear plan, and ``contact.creep.table`` in scenes whose contact reads a table of default planes and
-    tolerance.
+    """Return the changes of a wear plan, with ``contact.creep.table`` added in scenes that read a default creep table.
+
+    A default creep table has the default planes and tolerance.
     """
     data, scenes = load_wear_plan(plan, changes)
     given = {"contact.creep.table": os.path.abspath(table)}
