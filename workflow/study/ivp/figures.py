@@ -1,7 +1,7 @@
-"""Figures of the benchmarks: error against work, drift of constraints.
+"""Figures of the benchmark: error over work, and drift of the constraints.
 
-They draw the tables of `study.ivp.runs`. A method keeps its colour and marker in all of them (`METHOD_STYLES`).
-Units change here and nowhere before: lengths to micrometres.
+They draw the tables of `study.ivp.runs`. A method has the same colour and marker in all figures (`METHOD_STYLES`).
+Lengths are converted to micrometres only in this module.
 """
 
 from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ METHOD_STYLES = {
     "scipy_lsoda": {"label": "scipy: LSODA", "color": "#E69F00", "marker": "P", "linestyle": (0, (3, 1))},
     "scipy_radau": {"label": "scipy: Radau", "color": "#D55E00", "marker": "X", "linestyle": (0, (6, 2, 2, 2))},
 }
-"""Okabe-Ito colours; marker and line tell the methods apart in grey too."""
+"""Label and style of each method. Colours are from Okabe-Ito; marker and line distinguish the methods in grey too."""
 
 TREATMENT_STYLES = (
     {"color": "#000000", "linestyle": "-"},
@@ -32,8 +32,10 @@ TREATMENT_STYLES = (
 
 @styled
 def fig_ivp_work_precision(table, effort, bar):
-    """Error of the lateral position at the end against evaluations and against seconds (`work_precision` without failed
-    runs), with the reference's effort (``solver``, ``evaluations``) and the error allowed (``bar``, m).
+    """Draw the error of the lateral position at the end over evaluations and over seconds.
+
+    ``table`` is that of `work_precision`; failed runs are omitted. ``effort`` is that of the reference (``solver``,
+    ``evaluations``), ``bar`` the accepted error (m).
     """
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -56,7 +58,7 @@ def fig_ivp_work_precision(table, effort, bar):
 
 @styled
 def fig_ivp_constraints(history):
-    """Violation of the constraints over time (`violation_history`) for Baumgarte's parameters and for projection."""
+    """Draw the violation of constraints over time (`violation_history`) for Baumgarte's parameters and projection."""
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
     panels = figure.subplots(1, 2)
     groups = history.groupby(["treatment", "alpha_per_s"])

@@ -1,4 +1,4 @@
-"""Data of the Test Set's problem "Wheelset": parameters, scratch arrays, and the file that holds all numbers."""
+"""Data of the problem "Wheelset" of the Test Set for IVP Solvers: parameters, work arrays, and file of all numbers."""
 
 import json
 from pathlib import Path
@@ -16,50 +16,50 @@ UNITS |= {name: "rad" if name.startswith("psi") else "m" for name in CONTACT}
 
 
 class Wheelset(NamedTuple):
-    """Parameters in SI units, by the Test Set's names where they end in brackets."""
+    """Parameters of the problem in SI units, with the Test Set's names in brackets."""
 
     mass: float
-    """(MR)"""
+    """Mass of the wheelset, kg (MR)."""
     gravity: float
-    """(G)"""
+    """Acceleration of gravity, m/s^2 (G)."""
     speed: float
-    """(V)"""
+    """Forward speed, m/s (V)."""
     radius: float
-    """Nominal radius of the wheels (RN0)."""
+    """Nominal radius of the wheels, m (RN0)."""
     inertia_axle: float
-    """About the axle (LI1)."""
+    """Moment of inertia about the axle, kg m^2 (LI1)."""
     inertia_across: float
-    """About the other axes (LI2)."""
+    """Moment of inertia about the other axes, kg m^2 (LI2)."""
     friction: float
-    """(MU)"""
+    """Coefficient of friction (MU)."""
     spring_arm: float
-    """Distance of the springs from the centre (XL)."""
+    """Distance of the springs from the centre, m (XL)."""
     stiffness_lateral: float
-    """Of either spring (CX)."""
+    """Lateral stiffness of each spring, N/m (CX)."""
     stiffness_longitudinal: float
-    """Of either spring (CZ)."""
+    """Longitudinal stiffness of each spring, N/m (CZ)."""
     hertz_e: float
-    """(E)"""
+    """First constant of the contact ellipse (E)."""
     hertz_g: float
-    """Constants of the contact ellipse (GG)."""
+    """Second constant of the contact ellipse (GG)."""
     poisson_ratio: float
-    """(SIGMA)"""
+    """Poisson's ratio (SIGMA)."""
     shear_modulus: float
-    """(GM)"""
+    """Shear modulus, N/m^2 (GM)."""
     c11: float
-    """Kalker's coefficients (C11, C22, C23)."""
+    """Kalker's coefficient C11; the following fields are C22 and C23."""
     c22: float
     c23: float
     cone_angle: float
-    """Of the wheels (DELTA0)."""
+    """Cone angle of the wheels, rad (DELTA0)."""
     half_distance: float
-    """Nominal point of contact from the centre, along the axle (AR)."""
+    """Distance along the axle from the centre to the nominal point of contact, m (AR)."""
     rail_radius: float
-    """(RS)"""
+    """Radius of the rail heads, m (RS)."""
     pi: float
-    """As the Test Set's program rounds it in the contact ellipse (PI)."""
+    """Rounded value of pi that the Test Set's program uses for the contact ellipse (PI)."""
     alpha: float
-    """Baumgarte's parameters, 1/s; no part of the Test Set."""
+    """Baumgarte's parameter alpha, 1/s; the next field is beta. Both are no part of the Test Set."""
     beta: float
 
 
@@ -67,26 +67,28 @@ PARAMETERS = (
     "MR", "G", "V", "RN0", "LI1", "LI2", "MU", "XL", "CX", "CZ", "E", "GG", "SIGMA", "GM", "C11", "C22", "C23",
     "DELTA0", "AR", "RS", "PI",
 )  # fmt: skip
-"""Names in the file, in the order of `Wheelset`."""
+"""Names of the parameters in the file, in the order of `Wheelset`."""
 
 
 class Work(NamedTuple):
-    """What an evaluation leaves behind; its contacts and multipliers start the next one. Rows: left, right wheel."""
+    """Results of an evaluation; rows are left and right wheel.
+
+    Contacts and multipliers are the initial values of the next evaluation."""
 
     contact: np.ndarray
-    """(2, 2): psi (rad) and xi (m)."""
+    """(2, 2): contact coordinates psi (rad) and xi (m)."""
     multipliers: np.ndarray
-    """(2,): lambda, N."""
+    """(2,): multipliers lambda, N."""
     phi: np.ndarray
     """(2,): gaps, m."""
     phi_rate: np.ndarray
-    """(2,): D v, m/s."""
+    """(2,): rates D v of the gaps, m/s."""
     gamma: np.ndarray
-    """(2,): -(dD/dt) v, m/s^2."""
+    """(2,): right-hand side -(dD/dt) v of the constraints, m/s^2."""
     jacobian: np.ndarray
-    """(2, 5): D."""
+    """(2, 5): Jacobian D of the gaps."""
     rail: np.ndarray
-    """(2, 2): slope (1) and second derivative (1/m) of the rail head at the point of contact."""
+    """(2, 2): first derivative (1) and second derivative (1/m) of the rail head at the point of contact."""
     creep: np.ndarray
     """(2, 3): arguments of the creep law."""
     traction: np.ndarray
@@ -96,36 +98,36 @@ class Work(NamedTuple):
     matrix: np.ndarray
     residual: np.ndarray
     counters: np.ndarray
-    """(3,) int: evaluations, Newton steps for the contacts and for the multipliers."""
+    """(3,) int: numbers of evaluations, of Newton steps for the contacts, and of those for the multipliers."""
 
 
 class Reference(NamedTuple):
-    """The Test Set's solution at one time, in the form of `Problem`."""
+    """The Test Set's solution at one time, with the arrays of `Problem`."""
 
     time: float
-    """s"""
+    """Time of the solution, s."""
     state: np.ndarray
     contact: np.ndarray
     multipliers: np.ndarray
     effort: dict
-    """Of the solver that computed it: solver, steps, accepted, evaluations, jacobians."""
+    """Effort of the solver that computed the solution: solver, steps, accepted, evaluations, jacobians."""
 
 
 class Problem(NamedTuple):
-    """The benchmark: parameters (Baumgarte's are zero), initial values and reference."""
+    """The benchmark: parameters (with Baumgarte's parameters zero), initial values and reference."""
 
     wheelset: Wheelset
     state: np.ndarray
-    """(11,): in the order of `STATE`."""
+    """(11,): initial state in the order of `STATE`."""
     contact: np.ndarray
-    """(2, 2): in the order of `CONTACT`."""
+    """(2, 2): initial contact coordinates in the order of `CONTACT`."""
     multipliers: np.ndarray
-    """(2,): left, right; N."""
+    """(2,): initial multipliers, left and right, N."""
     reference: Reference
 
 
 def workspace(problem):
-    """Allocate the scratch arrays for a run from the initial values of a `Problem`."""
+    """Allocate the work arrays for a run from the initial values of a `Problem`."""
     return Work(
         problem.contact.copy(), problem.multipliers.copy(), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros((2, 5)),
         np.zeros((2, 2)), np.zeros((2, 3)), np.zeros((2, 2, 6)), np.zeros(6), np.zeros((2, 2)), np.zeros(2),
@@ -134,8 +136,10 @@ def workspace(problem):
 
 
 def read_problem(path):
-    """Read the benchmark's JSON file, the Test Set's parameters by their own names, initial values and reference
-    (``config/benchmarks/ivp_wheelset.json``); InputError if it cannot be read or a number is missing.
+    """Read the benchmark's JSON file (``config/benchmarks/ivp_wheelset.json``).
+
+    The file contains parameters with the Test Set's names, initial values and reference. InputError if it cannot be
+    read or a number is missing.
     """
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -149,7 +153,7 @@ def read_problem(path):
 
 
 def _unknowns(data, place, path):
-    """State (11,), contact coordinates (2, 2) and multipliers (2,)."""
+    """Return state (11,), contact coordinates (2, 2) and multipliers (2,) from a part of the file."""
     names = {"state": STATE, "contact": CONTACT, "multipliers": MULTIPLIERS}
     state, contact, multipliers = (_numbers(data, key, names[key], path, place) for key in names)
     return state, contact.reshape(2, 2), multipliers

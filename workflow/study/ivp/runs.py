@@ -1,8 +1,8 @@
-"""The Test Set's problem "Wheelset" as a study: how well the constrained equations are solved, and what that costs.
+"""Study of the Test Set's problem "Wheelset": accuracy and cost of the solution of the constrained equations.
 
-The equations of `study.ivp.wheelset` are stabilised as everywhere else, by Baumgarte's feedback of Eq. (8),
-and integrated by an explicit pair in a compiled loop. Besides, each step can be projected onto the constraints, and
-scipy's solvers run for comparison.
+The equations of `study.ivp.wheelset` are stabilised by Baumgarte's feedback of Eq. (8), as in wrcore, and integrated by
+an explicit pair in a compiled loop. Optionally each step is projected onto the constraints. Scipy's solvers run for
+comparison.
 """
 
 import time
@@ -16,38 +16,40 @@ from study.ivp.wheelset import right_hand_side, run_pair
 
 ATOL_OVER_RTOL = 1e-3
 TABLEAUS = {"rk45": (np.hstack([RK45.A, np.zeros((RK45.n_stages, 1))]), RK45.B, RK45.E)}
-"""Square matrix of stages, weights, weights of the error: Dormand and Prince's 5(4) pair."""
+"""Matrix of stages, weights, and weights of the error estimate of each pair: Dormand and Prince's 5(4) pair."""
 PROJECTED = "_projected"
-"""Ending of the methods that project each step."""
+"""Ending of the names of methods that project each step onto the constraints."""
 SCIPY = {"scipy_rk45": "RK45", "scipy_dop853": "DOP853", "scipy_lsoda": "LSODA", "scipy_radau": "Radau"}
 
 
 class Run(NamedTuple):
-    """A run of the benchmark: its last state, and what it cost."""
+    """A run of the benchmark: its last state and its cost."""
 
     status: str
-    """completed or failed."""
+    """Status at the end: completed or failed."""
     state: np.ndarray
-    """(11,)"""
+    """(11,): last state."""
     contact: np.ndarray
-    """(2, 2), as of `study.ivp.problem.Problem`."""
+    """(2, 2): last contact coordinates, in the order of `study.ivp.problem.Problem`."""
     multipliers: np.ndarray
-    """(2,), N."""
+    """(2,): last multipliers, N."""
     violation: np.ndarray
-    """(2,): the larger |Phi| (m) and the larger |Phi'| (m/s) at the last state."""
+    """(2,): maximum of |Phi| (m) and of |Phi'| (m/s) over both wheels at the last state."""
     history: np.ndarray
-    """(n, 2): largest violation over the steps up to each time; NaN for scipy's solvers."""
+    """(n, 2): maximum violation in the steps before each time; NaN for scipy's solvers."""
     steps: int
     rejected: float
-    """Rejected attempts; NaN for scipy's solvers, which do not count them."""
+    """Number of rejected steps; NaN for scipy's solvers, which do not count them."""
     evaluations: int
     seconds: float
 
 
 def solve(problem, method, rtol, alpha=0.0, beta=0.0, times=None):
-    """Integrate the benchmark up to the last of the times (n,), s (the reference's if not given), by a pair of
-    `TABLEAUS`, alone or with the ending `PROJECTED`, or one of `SCIPY`; the absolute tolerance is `ATOL_OVER_RTOL`
-    times ``rtol``. With Baumgarte's alpha and beta (1/s) of zero the constraints hold as accelerations only.
+    """Integrate the benchmark up to the last of the times (n,), s, or to the reference's time by default.
+
+    ``method`` is a pair of `TABLEAUS`, optionally with the ending `PROJECTED`, or one of `SCIPY`. The absolute
+    tolerance is `ATOL_OVER_RTOL` times ``rtol``. If Baumgarte's alpha and beta (1/s) are zero, only the accelerations
+    satisfy the constraints.
     """
     wheelset, work = problem.wheelset._replace(alpha=float(alpha), beta=float(beta)), workspace(problem)
     times = np.array([0.0, problem.reference.time]) if times is None else np.asarray(times, float)
@@ -75,7 +77,7 @@ def _compiled_run(function, wheelset, work, state, method, rtol, times, history)
 
 def _scipy_run(function, wheelset, work, state, method, rtol, times, history):
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # a wild trial step is rejected by its error estimate
+        with np.errstate(over="ignore", invalid="ignore"):  # the error estimate rejects a trial step that diverges
             path = solve_ivp(function, times[[0, -1]], state, SCIPY[method], rtol=rtol, atol=ATOL_OVER_RTOL * rtol)
     except ValueError:  # implicit solvers refuse a Jacobian that is not finite
         return False, np.full_like(state, np.nan), 0, np.nan
@@ -83,13 +85,13 @@ def _scipy_run(function, wheelset, work, state, method, rtol, times, history):
 
 
 def error_of(problem, run):
-    """Error of x at the reference's time (m), and the largest relative error of the eleven state variables."""
+    """Return the error of x at the reference's time (m) and the maximum relative error of all state variables."""
     error = abs(run.state - problem.reference.state)
     return error[0], (error / abs(problem.reference.state)).max()
 
 
 def value_table(problem, run):
-    """All seventeen unknowns beside the reference at its time: quantity, unit, reference, found, difference."""
+    """Return a table of all 17 unknowns at the reference's time: quantity, unit, reference, found, difference."""
     import pandas as pd
 
     names = [*STATE, *CONTACT, *(f"lambda_{side}" for side in MULTIPLIERS)]
@@ -101,9 +103,11 @@ def value_table(problem, run):
 
 
 def work_precision(problem, tolerances, repetitions, feedback=0.0):
-    """Error of x against evaluations and seconds (medians over passes through all runs in turn, after a short run of
-    each method that compiles) at relative tolerances of each method, with Baumgarte's alpha = beta = ``feedback``
-    (1/s); error_max is relative, over all eleven state variables.
+    """Return the table of the error of x, evaluations and seconds at several relative tolerances of each method.
+
+    Seconds are medians over passes through all runs in turn, after a short run of each method for compilation.
+    Baumgarte's alpha = beta is ``feedback`` (1/s). The column error_max is the maximum relative error over all eleven
+    state variables.
     """
     import pandas as pd
 
@@ -121,14 +125,15 @@ def work_precision(problem, tolerances, repetitions, feedback=0.0):
 
 
 def treatments(parameters):
-    """What can be done about drift: (name, method, Baumgarte's alpha = beta), the projection last."""
+    """Return the treatments of drift as (name, method, Baumgarte's alpha = beta in 1/s); the last is projection."""
     found = [("Baumgarte", "rk45", float(value)) for value in parameters]
     return [*found, ("projection", "rk45" + PROJECTED, 0.0)]
 
 
 def stabilisation_table(problem, parameters, tolerances):
-    """Effect of Baumgarte's alpha = beta (1/s), and of projection, on the error, the drift (phi_m and phi_rate_m_per_s:
-    violation of position and velocity constraints at the end) and the cost.
+    """Return the table of error, drift and cost for values of Baumgarte's alpha = beta (1/s) and for projection.
+
+    The drift is the violation of the constraints at the end: phi_m for positions, phi_rate_m_per_s for velocities.
     """
     import pandas as pd
 
@@ -142,8 +147,10 @@ def stabilisation_table(problem, parameters, tolerances):
 
 
 def violation_history(problem, parameters, rtol, points):
-    """Violation of the constraints over equally spaced times, at accepted steps, by Baumgarte's alpha = beta (1/s):
-    treatment, alpha_per_s, t_s, phi_m, phi_rate_m_per_s (larger of the two wheels).
+    """Return the violation of the constraints at accepted steps over equally spaced times, for each treatment of drift.
+
+    Columns are treatment, alpha_per_s (Baumgarte's alpha = beta, 1/s), t_s, phi_m and phi_rate_m_per_s (maximum of the
+    two wheels).
     """
     import pandas as pd
 

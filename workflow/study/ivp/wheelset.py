@@ -1,19 +1,19 @@
-"""The problem "Wheelset" of the Test Set for IVP Solvers: two rigid contacts, and creep that depends on their forces.
+"""Equations of the problem "Wheelset" of the Test Set for IVP Solvers: two rigid contacts with creep forces.
 
 Simeon, Fuehrer and Rentrop, Surv. Math. Ind. 1 (1991) 1-37: conical wheels on circular rail heads, suspended laterally
-and longitudinally, rolling at constant speed. Axes are the problem's own: x to the left, y up, z forward. Unknowns are
+and longitudinally, rolling at constant speed. The axes are the problem's: x to the left, y up, z forward. Unknowns are
 q = (x, y, z, yaw theta, roll phi), their rates v, the deviation beta of the spin rate, and for either wheel (left, then
 right) the multiplier lambda and the contact coordinates psi (about the axle) and xi (along it).
 
 The gap g(q, psi, xi) of a wheel is the height of the rail head above a point of the wheel, at the lateral position of
 that point. The point of contact is where g is stationary over psi and xi: the normals are parallel there, which are the
-problem's contact conditions. The gap's gradient D over q then has no share of psi and xi. The constraints are
-Phi = (g_left, g_right) = 0, and Eq. (8) of the multibody code, with the problem's sign of lambda, reads
+problem's contact conditions. Changes of psi and xi then do not contribute to the gap's gradient D with respect to q.
+The constraints are Phi = (g_left, g_right) = 0. Eq. (8) of the multibody code, with the problem's sign of lambda, is
 
     M v' = f(q, v, lambda) + D^T lambda,    D v' = gamma - 2 alpha Phi' - beta^2 Phi.
 
-f holds the creep forces, and these the normal forces N = -lambda sqrt(1 + G'^2) with the slope G' of the rail head:
-Newton's method finds lambda. Arrays and their units: `study.ivp.problem.Work`.
+f contains the creep forces, which depend on the normal forces N = -lambda sqrt(1 + G'^2) with the derivative G' of the
+rail head. Therefore lambda is computed by Newton's method. Arrays and their units: `study.ivp.problem.Work`.
 """
 
 import math
@@ -31,7 +31,7 @@ _GAP = 1e-15  # m
 
 @jit(allocates=False)
 def rail_head(p, x):
-    """Height G (m), slope and second derivative (1/m) of the rail heads at the lateral position x (m)."""
+    """Return height G (m), first and second derivative (1/m) of the rail heads at the lateral position x (m)."""
     across = abs(x) - p.half_distance - p.rail_radius * math.sin(p.cone_angle)
     up = math.sqrt(p.rail_radius**2 - across * across)
     height = up - p.radius - p.rail_radius * math.cos(p.cone_angle)
@@ -40,21 +40,23 @@ def rail_head(p, x):
 
 @jit(allocates=False)
 def wheel_radius(p, xi):
-    """Radius (m) and slope of the cone at xi (m)."""
+    """Return the radius (m) and its derivative for the conical wheel at xi (m)."""
     tangent = math.tan(p.cone_angle)
     return p.radius + tangent * (p.half_distance - abs(xi)), -math.copysign(tangent, xi)
 
 
 @jit(allocates=False)
 def _turned(turn, along, down, forward):
-    """Lateral and vertical part of a vector that is given in the wheelset: along the axle, downwards and forwards."""
+    """Return the lateral and vertical components of a vector that is given in the wheelset's axes.
+
+    Its components there are along the axle, downwards and forwards."""
     st, ct, sp, cp = turn
     return ct * (along * cp + down * sp) + st * forward, along * sp - down * cp
 
 
 @jit(allocates=False)
 def _turning(turn, yaw_rate, roll_rate, along, down, forward):
-    """Rates of both parts while the wheelset turns and the vector stays fixed in it."""
+    """Return the rates of the lateral and vertical components of a vector that is fixed in the rotating wheelset."""
     st, ct, sp, cp = turn
     out, out_rate = along * cp + down * sp, roll_rate * (down * cp - along * sp)
     return ct * out_rate + yaw_rate * (ct * forward - st * out), roll_rate * out
@@ -62,7 +64,9 @@ def _turning(turn, yaw_rate, roll_rate, along, down, forward):
 
 @jit(allocates=False)
 def stationary_gap(p, state, turn, psi, xi):
-    """Derivatives of the gap over a wheel's contact coordinates: g_xi, g_psi, g_xixi, g_xipsi, g_psipsi."""
+    """Return the derivatives of the gap with respect to a wheel's contact coordinates.
+
+    They are g_xi, g_psi, g_xixi, g_xipsi and g_psipsi."""
     radius, taper = wheel_radius(p, xi)
     s, c = math.sin(psi), math.cos(psi)
     x, _ = _turned(turn, xi, radius * c, -radius * s)
@@ -91,7 +95,7 @@ def touch(p, k, state, turn, work):
         work.counters[1] += 1
         if abs(d_psi) + abs(d_xi) < _CONTACT_STEP:
             break
-    if math.isfinite(psi + xi):  # a wild trial step must not spoil the start of the next search
+    if math.isfinite(psi + xi):  # a trial step that diverges must not change the start of the next search
         work.contact[k, 0], work.contact[k, 1] = psi, xi
     st, ct, sp, cp = turn
     radius, taper = wheel_radius(p, xi)
@@ -121,7 +125,7 @@ def touch(p, k, state, turn, work):
 
 @jit(allocates=False)
 def creep_arguments(p, k, state, turn, work):
-    """Fill in what the creep forces of wheel k need apart from its normal force."""
+    """Fill the arguments of the creep law of wheel k that do not depend on its normal force."""
     st, ct, sp, cp = turn
     psi, xi = work.contact[k]
     radius, taper = wheel_radius(p, xi)
@@ -157,9 +161,9 @@ def creep_arguments(p, k, state, turn, work):
 
 @jit(allocates=False)
 def tangential(p, creep, normal):
-    """Longitudinal and lateral creep force at a normal force, and their derivatives over it.
+    """Return longitudinal and lateral creep force, and their derivatives with respect to the normal force.
 
-    With n = N^(-1/3): T = -mu N (tanh(a_1 n), tanh(a_2 n + a_3)), scaled back to mu N where it exceeds it.
+    With n = N^(-1/3): T = -mu N (tanh(a_1 n), tanh(a_2 n + a_3)), scaled to mu N if its magnitude is larger.
     """
     n = normal ** (-1.0 / 3.0)
     t1, t2 = math.tanh(creep[0] * n), math.tanh(creep[1] * n + creep[2])
@@ -175,14 +179,14 @@ def tangential(p, creep, normal):
 
 @jit(allocates=False)
 def _response(p, cp, row, force):
-    """D M^-1 times a generalised force, for one row of D."""
+    """Return the product of one row of D, M^-1 and a generalised force."""
     plane = (row[0] * force[0] + row[1] * force[1] + row[2] * force[2]) / p.mass
     return plane + (row[3] * force[3] / cp + row[4] * force[4]) / p.inertia_across
 
 
 @jit(allocates=False)
 def _solve(matrix, residual):
-    """-matrix^-1 residual for two equations."""
+    """Return the solution -matrix^-1 residual of two linear equations."""
     determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
     first = matrix[0, 1] * residual[1] - matrix[1, 1] * residual[0]
     second = matrix[1, 0] * residual[0] - matrix[0, 0] * residual[1]
@@ -191,10 +195,10 @@ def _solve(matrix, residual):
 
 @jit(allocates=False)
 def solve_multipliers(p, cp, work):
-    """Newton's method for the multipliers: D M^-1 (f + D^T lambda) = gamma - 2 alpha Phi' - beta^2 Phi.
+    """Solve D M^-1 (f + D^T lambda) = gamma - 2 alpha Phi' - beta^2 Phi for the multipliers by Newton's method.
 
-    ``work.force`` holds f without creep forces, and all forces afterwards. Each column of the matrix belongs to one
-    wheel, whose creep forces follow its own normal force.
+    ``work.force`` contains f without creep forces at the start, and all forces at the end. Each column of the matrix
+    belongs to one wheel, whose creep forces depend only on its normal force.
     """
     force, multipliers, jacobian = work.force, work.multipliers, work.jacobian
     residual, matrix = work.residual, work.matrix
@@ -231,7 +235,9 @@ def solve_multipliers(p, cp, work):
 
 @jit(allocates=False)
 def _displace(p, cp, values, part, work):
-    """Add to five numbers the displacement of least kinetic energy that changes D times them by minus ``values``."""
+    """Add a displacement to five numbers so that D times them changes by minus ``values``.
+
+    The displacement has minimum norm in the metric of the mass matrix."""
     for j in range(2):
         for k in range(2):
             work.matrix[j, k] = _response(p, cp, work.jacobian[j], work.jacobian[k])
@@ -243,7 +249,7 @@ def _displace(p, cp, values, part, work):
 
 @jit(allocates=False)
 def project(p, state, work):
-    """Move a state (11,) onto Phi = 0 and D v = 0, orthogonally in the metric of the mass matrix."""
+    """Project a state (11,) onto Phi = 0 and D v = 0, orthogonally in the metric of the mass matrix."""
     for _ in range(_NEWTON):
         turn = sines(state)
         for k in range(2):
@@ -256,13 +262,13 @@ def project(p, state, work):
 
 @jit(allocates=False)
 def sines(state):
-    """Sine and cosine of yaw, sine and cosine of roll."""
+    """Return sine and cosine of yaw, and sine and cosine of roll."""
     return math.sin(state[3]), math.cos(state[3]), math.sin(state[4]), math.cos(state[4])
 
 
 @jit(allocates=False)
 def fill_rate(t, state, p, work, rate):
-    """Right-hand side: derivative of the state (11,), the contacts and the multipliers found inside."""
+    """Fill the time derivative ``rate`` (11,) of the state, and solve for contacts and multipliers in ``work``."""
     turn = sines(state)
     _, _, sp, cp = turn
     work.counters[0] += 1
@@ -298,7 +304,7 @@ def _rate_of_boxed(t, state, box):
 
 
 def right_hand_side(p, work):
-    """The equations as ``function(t, state)`` for a solver written in Python; see
+    """Return the equations as ``function(t, state)`` for a solver written in Python; see
     `wrcore.equations.equations_of_motion`."""
     box = List()
     box.append((p, work))
@@ -313,13 +319,15 @@ def _keep_worst(work, worst):
 
 @jit
 def run_pair(a, b, e, p, work, state, times, history, rtol, atol, projected):
-    """Integrate with an explicit embedded pair whose last stage starts the next step, tableau a (s, s), b (s,) and
-    weights e (s + 1,) of the error estimate, of order s - 2: numbers of steps (negative: the step size fell below the
-    resolution of time) and of rejected ones.
+    """Integrate with an explicit embedded pair; return the numbers of accepted and of rejected steps.
 
-    Overwrites the state (11,) with the last one, at the last of the increasing times (n,), s, and fills ``history``
-    (n, 2) with the largest violations abs(Phi) (m) and abs(Phi') (m/s) of the two constraints after the steps up to
-    each time, counted from the time before. ``projected``: the state is projected after each step.
+    The last stage of the pair is the first of the next step. The tableau is a (s, s), b (s,) and the weights e (s + 1,)
+    of the error estimate, which has the order s - 2. The number of steps is negative if the step size falls below the
+    resolution of time.
+
+    The state (11,) is overwritten with that at the last of the increasing times (n,), s. ``history`` (n, 2) is filled
+    with the maximum violations abs(Phi) (m) and abs(Phi') (m/s) of the two constraints between successive times. If
+    ``projected``, the state is projected after each step.
     """
     stages, n = b.shape[0], state.shape[0]
     k, trial, worst = np.zeros((stages + 1, n)), np.zeros(n), np.zeros(2)
