@@ -1,4 +1,4 @@
-"""The study's creep table, for scenes whose contact reads one."""
+"""Use of the study's creep table in scenes whose contact reads a creep table."""
 
 import os
 
@@ -8,7 +8,7 @@ from wrcore.scene.description import load_scene
 
 
 def reads_default_table(contact):
-    """Whether the contact of a scene reads a creep table of the default planes and tolerance, and names no other."""
+    """Whether the contact of a scene reads a creep table with default planes and tolerance and names no file for it."""
     creep = contact["creep"]
     wanted = {"model": "table", "planes": "ellipse", "tolerance": DEFAULT_TOLERANCE}
     is_default = all(creep[key] == value for key, value in wanted.items())
@@ -16,8 +16,10 @@ def reads_default_table(contact):
 
 
 def with_creep_table(source, changes, table):
-    """Changes of a scene, and ``contact.creep.table`` where its contact reads a table of the default planes and
-    tolerance. ``changes`` are a list of ``key=value`` or values by key; a scene names files relative to its folder.
+    """Return the changes of a scene, with ``contact.creep.table`` added if its contact reads a default creep table.
+
+    A default creep table has the default planes and tolerance. ``changes`` are a list of ``key=value`` or values by
+    key. Paths in a scene are relative to its folder.
     """
     if not reads_default_table(load_scene(source, changes).data["contact"]):
         return changes

@@ -1,7 +1,7 @@
-"""Looks that figures of several questions share.
+"""Styles that figures of several questions have in common.
 
-Planar and spatial detection keep their colour, line and marker in every figure; they differ in lightness too, so that a
-grey copy stays readable.
+Planar and spatial detection have the same colour, line and marker in every figure. They also differ in lightness, so
+that a grey copy is readable.
 """
 
 LINES = {
@@ -13,19 +13,20 @@ MARKERS = {
     "planar": {"color": "#0072B2", "marker": "o", "s": 14, "linewidths": 0},
     "spatial": {"color": "#E69F00", "marker": "o", "s": 2.5, "linewidths": 0},
 }
-"""Blue and orange of the Okabe-Ito palette: told apart with any colour vision, and dark against light in grey. The
-smaller markers of spatial detection lie on top, so that both are seen where they coincide."""
+"""Marker style of planar and spatial detection. Blue and orange of the Okabe-Ito palette can be distinguished with any
+colour vision, and in grey. The markers of spatial detection are smaller and on top, so that coinciding markers are both
+visible."""
 
 
 def derailed_at(axes, speeds, color):
-    """Crosses at the upper edge of a panel, at the speeds (m/s) of runs that derailed."""
+    """Draw crosses at the upper edge of a panel, at the speeds (m/s) of derailed runs."""
     if len(speeds):
         look = {"marker": "x", "linestyle": "", "color": color, "transform": axes.get_xaxis_transform()}
         axes.plot(speeds, [0.97] * len(speeds), label="derailed", **look)
 
 
 def shared_legend(figure, panels, **kwargs):
-    """One legend for all panels, above them, each label once."""
+    """Draw one legend for all panels above them, with each label once."""
     entries = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
