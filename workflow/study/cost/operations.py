@@ -246,9 +246,7 @@ def _by_law(elements, k, *motion):
 def interpreted(tally):
     """Replace compiled kernels by Python functions, counted by stage, within a ``with`` block."""
     registers, mathematics, before = _registers(tally), _mathematics(tally), []
-    modules = [
-        m for name, m in sys.modules.items() if name.startswith("wrcore.")
-    ]
+    modules = [m for name, m in sys.modules.items() if name.startswith("wrcore.")]
     for module in modules:
         for name, value in list(vars(module).items()):
             new = value

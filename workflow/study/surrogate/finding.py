@@ -75,7 +75,7 @@ def fill_base(model, velocities, slip, log_a, log_b, angle, limit, base, disk):
     """Fill ``base`` (n, 3) with creep forces of the creep table and ``disk`` (n, 2) with positions in the unit disk.
 
     Both belong to ``velocities`` (n, 6) and have the normalisation of
-    :func:`wrcore.wheels.surrogate_force.roll_patch`."""
+    :func:`wrcore.wheels.surrogate_patch.roll_patch`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
     unit = model.shear_modulus * math.exp(log_a + log_b) / (3.0 * limit)

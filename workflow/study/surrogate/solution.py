@@ -103,7 +103,7 @@ def random_points(random, count=N_RANDOM):
 
 
 def unbounded(x, bound):
-    """Return the inverse of `wrcore.wheels.surrogate_force.bounded` at x; |x| is limited to 0.95 of the bound."""
+    """Return the inverse of `wrcore.wheels.surrogate_patch.bounded` at x; |x| is limited to 0.95 of the bound."""
     half = 0.5 * bound
     over = min(abs(x), 0.95 * bound) - half
     if not over > 0.0:
