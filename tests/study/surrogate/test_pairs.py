@@ -64,3 +64,9 @@ def test_waves_have_their_amplitude_and_length():
     assert np.std(found, axis=1) == pytest.approx(2e-5)
     slopes = np.std(np.gradient(found, u, axis=1), axis=1)  # correlation length: sqrt(2) times that of the kernel
     assert slopes.mean() == pytest.approx(2e-5 / (2e-3 * np.sqrt(2.0)), rel=0.1)
+
+
+def test_share_of_new_profiles_is_the_one_asked_for():
+    names = [random_pair(np.random.default_rng([7, k]), new_share=1.0).name for k in range(8)]
+    assert not any("hollow" in name or "waves" in name or "worn" in name for name in names)
+    assert any("hollow" in random_pair(np.random.default_rng([7, k])).name for k in range(8))

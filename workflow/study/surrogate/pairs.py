@@ -145,9 +145,13 @@ def _with_cone(wheel, slope):
     return ProfileCurve.from_points(u, f - np.interp(0.0, u, f), "wheel", wheel.name, trim=True)
 
 
-def worn_wheel(random, wheel, name):
+NEW_WHEELS, NEW_RAILS = 0.15, 0.25
+"""Shares of the wheels and rails that have no wear."""
+
+
+def worn_wheel(random, wheel, name, new_share=NEW_WHEELS):
     """Return a wheel after random wear, and its name; 15 % of the wheels are unchanged."""
-    if random.random() < 0.15:
+    if random.random() < new_share:
         return wheel, name
     u, f = _points(wheel, -0.060, 0.055)
     has_flange = wheel(np.array([-0.035]))[0] < -2e-3
@@ -193,12 +197,12 @@ def rail_base(random, measured):
     return named_profile(name, "rail", inclination), f"{name} at {inclination:.4f}", inclination
 
 
-def worn_rail(random, rail, name, wheel, shift):
+def worn_rail(random, rail, name, wheel, shift, new_share=NEW_RAILS):
     """Return a rail after random wear or grinding, and its name; a quarter of the rails are unchanged.
 
     ``shift`` is the lateral position of the wheel's tape circle relative to the rail, m. Wear is on the gauge side
     (u < 0) or, for a rail that was turned round in the track, on the field side."""
-    if random.random() < 0.25:
+    if random.random() < new_share:
         return rail, name
     u, new = _points(rail, -0.1, 0.1)
     f, side = new.copy(), (1.0 if random.random() < 0.85 else -1.0)
@@ -254,9 +258,9 @@ def _towards_wheel(random, u, f, wheel, shift):
     return _smoothed(inside * random.uniform(0.15, 0.95) * difference, 7e-4)
 
 
-def _one_pair(random, measured):
+def _one_pair(random, measured, new_share):
     """Return a random `Pair`, or None if it is a test pair."""
-    wheel, wheel_name = worn_wheel(random, *wheel_base(random, measured))
+    wheel, wheel_name = worn_wheel(random, *wheel_base(random, measured), new_share or NEW_WHEELS)
     rail, rail_name, inclination = rail_base(random, measured)
     half = 0.75 if random.random() < 0.6 else random.uniform(*_HALF_DISTANCES)
     gauge = rail.gauge_offset()
@@ -264,7 +268,7 @@ def _one_pair(random, measured):
         gauge = _CLEARANCE
     distance = half - _CLEARANCE + gauge + (random.normal(0.0, 2e-3) if random.random() < 0.6 else 0.0)
     new = rail_name
-    rail, rail_name = worn_rail(random, rail, rail_name, wheel, half - distance)
+    rail, rail_name = worn_rail(random, rail, rail_name, wheel, half - distance, new_share or NEW_RAILS)
     radius = 0.46 if random.random() < 0.25 else random.uniform(*RADII)
     if rail_name == new and is_test_pair(wheel_name, rail_name.partition(" ")[0], inclination):
         return None
@@ -282,7 +286,7 @@ def is_test_pair(wheel, rail, inclination):
     )
 
 
-def random_pair(random, measured=None):
+def random_pair(random, measured=None, new_share=0.0):
     """Return a random `Pair` that is no test pair. A pair with invalid profiles is replaced by a new random pair.
 
     Parameters
@@ -290,6 +294,8 @@ def random_pair(random, measured=None):
     random : numpy.random.Generator
     measured : Measured, optional
         Profiles from which some of the wheels and rails are generated.
+    new_share : float, optional
+        Share of wheels, and of rails, without wear; 0: `NEW_WHEELS` and `NEW_RAILS`.
 
     Raises
     ------
@@ -299,7 +305,7 @@ def random_pair(random, measured=None):
     reason = None
     for _ in range(50):
         try:
-            pair = _one_pair(random, measured or Measured())
+            pair = _one_pair(random, measured or Measured(), new_share)
             if pair is not None:
                 _ = pair.on_rail.geometry
                 return pair

@@ -18,7 +18,7 @@ import numpy as np
 import wrcore
 from study.surrogate import shards
 from study.surrogate.finding import OVERLAPS
-from study.surrogate.pairs import random_pair, read_measured
+from study.surrogate.pairs import NEW_RAILS, NEW_WHEELS, random_pair, read_measured
 from study.surrogate.positions import (
     LOADS,
     MOST_ANGLE,
@@ -63,6 +63,8 @@ class Sampling(NamedTuple):
     """Measured profiles (`study.surrogate.pairs.Measured`), or None."""
     reference: np.ndarray = np.zeros((0, 38))
     """(n, N_DESCRIPTORS): descriptors to which distances are computed, in addition to those of the same shard."""
+    new_share: float = 0.0
+    """Share of wheels, and of rails, without wear; 0: the default shares."""
 
 
 def scaled_inputs(descriptors):
@@ -94,7 +96,7 @@ class _Candidate(NamedTuple):
 def _draw_candidate(random, sampling, positions=POSITIONS):
     """Return a random `_Candidate` that has enough patches at the given number of random positions."""
     while True:
-        pair = random_pair(random, sampling.measured)
+        pair = random_pair(random, sampling.measured, sampling.new_share)
         exact = ExactPatches(pair.on_rail, random_friction(random))
         drawn = draw_positions(random, exact, positions)
         if len(drawn) * POSITIONS >= LEAST_DRAWN * positions:
@@ -213,6 +215,8 @@ def _options():
     parser.add_argument("--candidates", type=int, default=1, help="pairs that are drawn for each pair that is kept, the"
                         " one farthest from the data (%(default)s: all are kept)")  # fmt: skip
     parser.add_argument("--reference", type=Path, help="folder of finished shards from which distances count, too")
+    parser.add_argument("--new", type=float, default=0.0, help="share of wheels, and of rails, without wear (default:"
+                        f" {NEW_WHEELS} and {NEW_RAILS})")  # fmt: skip
     parser.add_argument("--profiles", type=Path, help="folder of measured profiles to start from")
     parser.add_argument("--unsolved", action="store_true", help="descriptors alone, for training with a teacher")
     parser.add_argument("--part", type=_part, default=(1, 1), help="k/n: every n-th shard from the k-th on")
@@ -220,6 +224,8 @@ def _options():
     for name, least in (("count", 1), ("seed", 0), ("shard", 1), ("candidates", 1)):
         if getattr(asked, name) < least:
             parser.error(f"--{name}: expected at least {least}, got {getattr(asked, name)}")
+    if not 0.0 <= asked.new <= 1.0:
+        parser.error(f"--new: expected a share from 0 to 1, got {asked.new}")
     return parser, asked
 
 
@@ -238,7 +244,11 @@ def main():
             paths = shards.found_in(asked.reference)
             reference = np.concatenate([shards.read(path)["descriptors"] for path in paths])
             settings["reference"] = shards.digest_of(paths)
-        sampling = Sampling(asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference)
+        if asked.new:
+            settings["new"] = asked.new
+        sampling = Sampling(
+            asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference, asked.new
+        )
         write_shards(asked.folder, asked.count, sampling, asked.part, settings,
                      lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip
     except InputError as error:
