@@ -118,7 +118,7 @@ class Jacobian(NamedTuple):
     slopes: np.ndarray
     law: np.ndarray
     """Scratch of :mod:`wrcore.jacobian.wheels`."""
-    column_numbers: np.ndarray  # (k, c) int: see `wrcore.jacobian.wheels.contact_places`
+    column_numbers: np.ndarray  # (k, c) int: numbers of the state whose columns contacts change
     row_numbers: np.ndarray  # (k, r) int
     implied: np.ndarray
     """(1,): 1 if stages use implied speeds of massless rails. Conditions: the rails' speeds were solved, the Jacobian
