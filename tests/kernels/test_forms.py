@@ -191,12 +191,12 @@ def test_kernels_of_edited_sources_are_not_kept(tmp_path):
     script = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
         "from pathlib import Path\n"
-        "from wrcore.contact import normal\n"
-        f"assert normal.__file__.startswith({str(tmp_path)!r})\n"
-        "source = Path(normal.__file__).with_name('statics.py')\n"
+        "from wrcore.contact import hertz\n"
+        f"assert hertz.__file__.startswith({str(tmp_path)!r})\n"
+        "source = Path(hertz.__file__).with_name('creepage.py')\n"
         "if sys.argv[1:]:\n"
         "    source.write_text(source.read_text() + '\\n')\n"
-        "normal.damping_factor(0.0, 1.0, 1.0)\n"
+        "hertz.damping_factor(0.0, 1.0, 1.0)\n"
     )
 
     def kept(cache, *edited):

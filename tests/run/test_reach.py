@@ -36,7 +36,7 @@ def irregularity(tmp_path, begin, **keys):
 def said(monkeypatch):
     """Lines that were said."""
     lines: list[str] = []
-    monkeypatch.setattr(reach, "warn_once", lines.append)
+    monkeypatch.setattr(reach, "warn", lines.append)
     return lines
 
 

@@ -243,7 +243,7 @@ def test_fmu_takes_the_text_of_laws_along(tmp_path):
 
 def test_law_of_a_file_is_pickled_with_its_scene(tmp_path):
     path = write(tmp_path, element="law.py:spring")
-    script = "import pickle, sys; from wrcore.scene.description import compile_scene;"
+    script = "import pickle, sys; from wrcore.scene.compile import compile_scene;"
     script += "print(compile_scene(pickle.load(open(sys.argv[1], 'rb')))[0].contact.friction)"
     import pickle
 

@@ -42,7 +42,7 @@ def straight_ahead(scene):
     """
     parts: dict = {}
     model, _ = compile_scene(scene, shared=parts)
-    (at_rest,) = (part for (name, *_), part in parts.items() if name == "rest")
+    (at_rest,) = (part for (name, *_), part in parts.items() if name == "equilibrium_positions")
     model = undriven(model)._replace(track=TrackModel(True, tangent_path(), no_irregularity()))
     return model, static_equilibrium(scene, model, at_rest).state
 
