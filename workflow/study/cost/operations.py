@@ -27,7 +27,7 @@ WHERE = {
     ("wrcore.equations.equations_of_motion", "element_forces"): "suspension",
     ("wrcore.equations.equations_of_motion", "add_reactions"): "joints",
     ("wrcore.equations.equations_of_motion", "_add_rail_wrenches"): "rest",
-    ("wrcore.wheels.hertzian_force", "find_patches"): "patch",
+    ("wrcore.wheels.force", "find_patches"): "patch",
     ("wrcore.contact.search.detection", "make_pose"): "search",
     ("wrcore.contact.search.detection", "make_window"): "search",
     ("wrcore.contact.search.detection", "near_blocks"): "search",
@@ -222,7 +222,7 @@ def _registers(tally):
         "ramp8": lambda: np.array([Number(k, tally) for k in range(8)], object),
         "lane": lambda lanes, k: lanes[int(k)],
         "total": total,
-        "greatest": max,
+        "maximum": max,
         "below": below,
         "where_below": where_below,
         "count_bits": lambda bits: int(bits).bit_count(),
@@ -260,7 +260,7 @@ def interpreted(tally):
                 new = registers[name]
             elif name == "call_address" and module.__name__ in (
                 "wrcore.equations.equations_of_motion",
-                "wrcore.wheels.hertzian_force",
+                "wrcore.wheels.force",
             ):
                 new = _call
             elif name == "other_at":
