@@ -166,7 +166,7 @@ def test_numbers_in_the_theory_are_those_of_the_code():
         ],
         "evaluation": [
             f"$\\rho$ = {wear_laws.DENSITY:g} kg/m³", f"k = {1e9 * wear_laws._MILD:g}e-9 and",
-            f"$q_1$ = {1e-6 * wear_laws._FLAT:g}e6 and $q_2$ = {1e-6 * wear_laws._MORE:g}e6",
+            f"$q_1$ = {1e-6 * wear_laws._FLAT:g}e6 and $q_2$ = {1e-6 * wear_laws._SEVERE:g}e6",
         ],
         "track": [
             f"{irregularity.CUTOFF_C}$", f"{irregularity.CUTOFF_R}$", f"{irregularity.CUTOFF_S}$ rad/m",
