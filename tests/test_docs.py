@@ -137,6 +137,7 @@ def test_numbers_in_the_theory_are_those_of_the_code():
     from wrcore.creep.kalker import GRID_A_OVER_B
     from wrcore.creep.laws import FASTSIM_GRID
     from wrcore.creep.table import DEFAULT_TOLERANCE
+    from wrcore.equations import pace
     from wrcore.forces.drive import GRIP
     from wrcore.forces.kinds import damper, friction
     from wrcore.geometry import irregularity
@@ -174,7 +175,7 @@ def test_numbers_in_the_theory_are_those_of_the_code():
         ],
         "integration": [
             f"${choice.STABLE:g}/", f"{tolerances.LENGTH}\\ \\mathrm m",
-            f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
+            f"\\min({pace.RATE:g},\\ V/{pace.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
             f"{choice.GROWING} steps for their length and {choice.FIRST['rodas5']} more",
             f"{choice.LAST['rodas5']} at most",
             f"less than {choice.WORTH:g} of", f"over {choice.TRIED} steps, after {choice.GROWING} in which",
