@@ -90,7 +90,7 @@ def test_rooms_stand_in_the_order_of_the_data():
 
 
 def test_the_integrator_knows_no_contact():
-    """What it asks of a model besides its rates stands in `wrcore.equations.interface`."""
+    """The integrator uses a model by `wrcore.equations.interface` and imports neither profiles, contact nor creep."""
     paths = (ROOT / "wrcore/integrate").glob("*.py")
     names = {name for path in paths for name, _ in imports(ast.parse(path.read_text("utf-8")))}
     rooms = {room_of(name) for name in names if name.startswith("wrcore.")}

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.surrogate import shards
-from study.surrogate.training_data import is_held_back, load, run_teacher, taught
+from study.surrogate import held_back, shards
+from study.surrogate.training_data import is_held_back, joined, load, run_teacher, taught
 from wrcore.contact.surrogate import network
 from wrcore.errors import InputError
 
@@ -148,3 +148,15 @@ def test_loss_falls_in_some_calls(training, random_shards):
         state, value = training.advance(state, data, settings)
         losses.append(value)
     assert losses[-1] < 0.8 * losses[0]
+
+
+def test_errors_of_held_back_patches_are_those_of_the_weights(random_shards):
+    rows, _ = joined([random_shards])
+    rows |= {"angle": np.linspace(0.0, 1.2, len(rows["pair"]))}
+    corrections, remainders = taught(shipped(), rows["descriptors"].astype(float), rows["disk"])
+    rows |= {"corrections": corrections + [0.02, *[0.0] * 7], "exact": rows["base"] + remainders + [0.03, 0.04, 0.0]}
+    of_load, of_force = held_back.errors(shipped(), rows)
+    np.testing.assert_allclose(of_load, 2.0, rtol=1e-4)
+    np.testing.assert_allclose(of_force, 5.0, rtol=1e-3)
+    found = held_back.table(shipped(), rows)
+    assert found["number"][0] == is_held_back(rows["pair"]).sum() and found["N, %"][0] == "2/2/2"

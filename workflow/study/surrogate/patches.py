@@ -65,6 +65,8 @@ class Sampling(NamedTuple):
     """(n, N_DESCRIPTORS): descriptors to which distances are computed, in addition to those of the same shard."""
     new_share: float = 0.0
     """Share of wheels, and of rails, without wear; 0: the default shares."""
+    pair_patches: int = 0
+    """Number of patches of each pair of profiles; 0: `PAIR_PATCHES` or `UNSOLVED_PATCHES`."""
 
 
 def scaled_inputs(descriptors):
@@ -146,7 +148,7 @@ def pair_patches(random, candidate, sampling, number):
 
     The two patches of a pair of twins are successive rows."""
     exact, rows, failed = candidate.exact, [], 0
-    count = PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES
+    count = sampling.pair_patches or (PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES)
     n = int(round(0.5 * TWINS * count))
     singles = choose(random, candidate.drawn, count - 2 * n)
     groups = [((one,), 0.0) for one in singles]
@@ -215,6 +217,8 @@ def _options():
     parser.add_argument("--candidates", type=int, default=1, help="pairs that are drawn for each pair that is kept, the"
                         " one farthest from the data (%(default)s: all are kept)")  # fmt: skip
     parser.add_argument("--reference", type=Path, help="folder of finished shards from which distances count, too")
+    parser.add_argument("--pair-patches", type=int, default=0, help="patches of each pair of profiles (default:"
+                        f" {PAIR_PATCHES}, unsolved {UNSOLVED_PATCHES})")  # fmt: skip
     parser.add_argument("--new", type=float, default=0.0, help="share of wheels, and of rails, without wear (default:"
                         f" {NEW_WHEELS} and {NEW_RAILS})")  # fmt: skip
     parser.add_argument("--profiles", type=Path, help="folder of measured profiles to start from")
@@ -224,6 +228,8 @@ def _options():
     for name, least in (("count", 1), ("seed", 0), ("shard", 1), ("candidates", 1)):
         if getattr(asked, name) < least:
             parser.error(f"--{name}: expected at least {least}, got {getattr(asked, name)}")
+    if asked.pair_patches < 0:
+        parser.error(f"--pair-patches: expected at least 1, got {asked.pair_patches}")
     if not 0.0 <= asked.new <= 1.0:
         parser.error(f"--new: expected a share from 0 to 1, got {asked.new}")
     return parser, asked
@@ -244,11 +250,11 @@ def main():
             paths = shards.found_in(asked.reference)
             reference = np.concatenate([shards.read(path)["descriptors"] for path in paths])
             settings["reference"] = shards.digest_of(paths)
-        if asked.new:
-            settings["new"] = asked.new
+        settings |= {name: getattr(asked, name) for name in ("new", "pair_patches") if getattr(asked, name)}
         sampling = Sampling(
-            asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference, asked.new
-        )
+            asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference, asked.new,
+            asked.pair_patches,
+        )  # fmt: skip
         write_shards(asked.folder, asked.count, sampling, asked.part, settings,
                      lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip
     except InputError as error:

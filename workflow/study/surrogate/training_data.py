@@ -117,7 +117,7 @@ def taught(teacher, descriptors, disk):
     return corrections, remainders
 
 
-def _joined(folders):
+def joined(folders):
     """Return the arrays of all shards by name, and the digest. Numbers of pairs are made unique over the folders."""
     paths, parts = [], []
     for place, folder in enumerate(folders):
@@ -150,7 +150,7 @@ def load(folders, teacher=None, start=None):
 
     With a ``teacher`` (arrays of weights by name) the targets are its outputs, and the shards may be unsolved. With
     weights ``start``, the inputs are shifted and scaled like those of these weights."""
-    rows, digest = _joined(folders)
+    rows, digest = joined(folders)
     descriptors, disk = rows["descriptors"].astype(float), rows.get("disk")
     if teacher is not None:
         disk = _random_disk(len(descriptors)) if disk is None else disk
