@@ -11,6 +11,7 @@ from wrcore.analysis.compare import Comparison as Comparison
 from wrcore.analysis.compare import compare as compare
 from wrcore.analysis.contact.contact import contact_table as contact_table
 from wrcore.analysis.contact.contacts import contacts as contacts
+from wrcore.analysis.contact.errors_in_run import contact_errors as contact_errors
 from wrcore.analysis.contact.in_run import patch_in_run as patch_in_run
 from wrcore.analysis.contact.patch import patch as patch
 from wrcore.analysis.pictures.draw import draw as draw
