@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from study.surrogate import patches, shards
+from study.surrogate import patches, positions, shards
+from study.surrogate.finding import LOAD
 from study.surrogate.pairs import Pair
 from study.surrogate.patches import Sampling, distances, make_shard, write_shards
 from study.surrogate.solution import POINTS, ExactPatches, random_points, unbounded
@@ -32,7 +33,7 @@ def few_patches():
         context.setattr(patches, "UNSOLVED_PATCHES", 6)
         context.setattr(patches, "LEAST_DRAWN", 6)
         draw = patches.draw_positions
-        context.setattr(patches, "draw_positions", lambda random, exact, *count: draw(random, exact, 40))
+        context.setattr(patches, "draw_positions", lambda random, exact, count, *more: draw(random, exact, 40, *more))
         yield
 
 
@@ -131,11 +132,30 @@ def test_farthest_candidate_is_kept(monkeypatch):
     monkeypatch.setattr(
         patches, "_draw_candidate", lambda *given: patches._Candidate(Pair(None, ""), None, next(drawn))
     )
-    monkeypatch.setattr(patches, "draw_positions", lambda random, exact, count: [One(5.0)])
+    monkeypatch.setattr(patches, "draw_positions", lambda random, exact, count, curving: [One(5.0)])
     monkeypatch.setattr(patches, "scaled_inputs", lambda rows: np.asarray(rows, float))
     best, distance = patches._keep_farthest(None, SMALL._replace(candidates=3), np.zeros((4, 38)))
     assert [one.descriptors[0] for one in best.drawn] == [3.0, 3.0, 3.0, 5.0]  # and those at its other positions
     assert distance == pytest.approx(3.0 * math.sqrt(38))
+
+
+def test_positions_in_curves_have_evenly_spread_contact_angles():
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    exact, random = ExactPatches(pair, 0.3), np.random.default_rng(4)
+    angles = []
+    for _ in range(60):
+        y, z, axle = positions._in_curve(random, exact)
+        found = exact.find(y, z, axle)
+        load = [one.numbers[LOAD] for one in found]
+        angles.append(np.average([one.shape.angle for one in found], weights=load))
+    counts, _ = np.histogram(angles, [0.0, 0.4, 0.7, 1.1])
+    assert counts.sum() > 55 and counts.min() >= 12
+
+
+def test_selected_patches_are_far_from_each_other():
+    inputs = np.concatenate([0.01 * np.random.default_rng(2).normal(size=(50, 3)), [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]])
+    chosen = positions._far_apart(np.random.default_rng(1), inputs, 4)
+    assert {50, 51, 52} < set(chosen) and len(set(chosen)) == 4
 
 
 def test_distance_is_to_the_nearest():

@@ -28,9 +28,10 @@ from study.surrogate.positions import (
     choose_twins,
     draw_positions,
     random_friction,
+    scaled_inputs,
 )
 from study.surrogate.solution import POINTS, ExactPatches, random_points
-from wrcore.contact.surrogate.network import N_CORRECTIONS, load_surrogate
+from wrcore.contact.surrogate.network import N_CORRECTIONS
 from wrcore.errors import InputError
 
 PAIR_PATCHES = 60
@@ -67,13 +68,10 @@ class Sampling(NamedTuple):
     """Share of wheels, and of rails, without wear; 0: the default shares."""
     pair_patches: int = 0
     """Number of patches of each pair of profiles; 0: `PAIR_PATCHES` or `UNSOLVED_PATCHES`."""
-
-
-def scaled_inputs(descriptors):
-    """Return descriptors (n, N_DESCRIPTORS), shifted, scaled and compressed like inputs of the package's network."""
-    surrogate = load_surrogate()
-    x = (np.asarray(descriptors, float) - surrogate.median) * surrogate.per_scale
-    return x / (1.0 + x * x) ** 0.25
+    curving: float = 0.0
+    """Share of the random positions that are drawn as in narrow curves."""
+    far: float = 0.0
+    """Share of the single patches of a pair that are selected such that they are far from each other."""
 
 
 def distances(descriptors, others):
@@ -100,7 +98,7 @@ def _draw_candidate(random, sampling, positions=POSITIONS):
     while True:
         pair = random_pair(random, sampling.measured, sampling.new_share)
         exact = ExactPatches(pair.on_rail, random_friction(random))
-        drawn = draw_positions(random, exact, positions)
+        drawn = draw_positions(random, exact, positions, sampling.curving)
         if len(drawn) * POSITIONS >= LEAST_DRAWN * positions:
             return _Candidate(pair, exact, drawn)
 
@@ -118,7 +116,7 @@ def _keep_farthest(random, sampling, known):
         distance = float(np.median(distances(scaled_inputs(some), known)))
         if distance > farthest:
             best, farthest = one, distance
-    drawn = best.drawn + draw_positions(random, best.exact, POSITIONS - SCORED_POSITIONS)
+    drawn = best.drawn + draw_positions(random, best.exact, POSITIONS - SCORED_POSITIONS, sampling.curving)
     return best._replace(drawn=drawn), farthest
 
 
@@ -150,7 +148,7 @@ def pair_patches(random, candidate, sampling, number):
     exact, rows, failed = candidate.exact, [], 0
     count = sampling.pair_patches or (PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES)
     n = int(round(0.5 * TWINS * count))
-    singles = choose(random, candidate.drawn, count - 2 * n)
+    singles = choose(random, candidate.drawn, count - 2 * n, sampling.far)
     groups = [((one,), 0.0) for one in singles]
     groups += [((one, twin), step) for one, twin, step in choose_twins(random, exact, candidate.drawn, n)]
     for patches, step in groups:
@@ -221,6 +219,10 @@ def _options():
                         f" {PAIR_PATCHES}, unsolved {UNSOLVED_PATCHES})")  # fmt: skip
     parser.add_argument("--new", type=float, default=0.0, help="share of wheels, and of rails, without wear (default:"
                         f" {NEW_WHEELS} and {NEW_RAILS})")  # fmt: skip
+    parser.add_argument("--curving", type=float, default=0.0, help="share of the positions that are drawn as in narrow"
+                        " curves (default: 0)")  # fmt: skip
+    parser.add_argument("--far", type=float, default=0.0, help="share of the single patches of a pair that are selected"
+                        " to be far from each other (default: 0)")  # fmt: skip
     parser.add_argument("--profiles", type=Path, help="folder of measured profiles to start from")
     parser.add_argument("--unsolved", action="store_true", help="descriptors alone, for training with a teacher")
     parser.add_argument("--part", type=_part, default=(1, 1), help="k/n: every n-th shard from the k-th on")
@@ -230,8 +232,9 @@ def _options():
             parser.error(f"--{name}: expected at least {least}, got {getattr(asked, name)}")
     if asked.pair_patches < 0:
         parser.error(f"--pair-patches: expected at least 1, got {asked.pair_patches}")
-    if not 0.0 <= asked.new <= 1.0:
-        parser.error(f"--new: expected a share from 0 to 1, got {asked.new}")
+    for name in ("new", "curving", "far"):
+        if not 0.0 <= getattr(asked, name) <= 1.0:
+            parser.error(f"--{name}: expected a share from 0 to 1, got {getattr(asked, name)}")
     return parser, asked
 
 
@@ -250,10 +253,12 @@ def main():
             paths = shards.found_in(asked.reference)
             reference = np.concatenate([shards.read(path)["descriptors"] for path in paths])
             settings["reference"] = shards.digest_of(paths)
-        settings |= {name: getattr(asked, name) for name in ("new", "pair_patches") if getattr(asked, name)}
+        settings |= {
+            name: getattr(asked, name) for name in ("new", "pair_patches", "curving", "far") if getattr(asked, name)
+        }
         sampling = Sampling(
             asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference, asked.new,
-            asked.pair_patches,
+            asked.pair_patches, asked.curving, asked.far,
         )  # fmt: skip
         write_shards(asked.folder, asked.count, sampling, asked.part, settings,
                      lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 from study.surrogate.finding import LOAD, OVERLAPS
 from study.surrogate.pairs import log_uniform
 from study.surrogate.solution import ExactPatches
+from wrcore.contact.surrogate.network import load_surrogate
 
 LOADS = 500.0, 2.5e5
 """Range of the normal force, N."""
@@ -42,11 +43,24 @@ _DOUBLE = 1.8
 _KURTOSIS = 18
 """Index of <e^4> in the descriptors."""
 
+_MOST_ATTACK = 0.016
+"""Maximum angle of attack of positions in curves, rad."""
+
+_ROOT_ANGLES = 0.1, 1.0
+"""Range of the mean contact angle of positions in curves, rad."""
+
 _TWIN_STEPS = 2.5e-5, 2.5e-4
 """Range of the lateral distance between twins, m."""
 
 _TWIN_LOADS = 0.3, 3.0
 """Range of the ratio between the loads of twins."""
+
+
+def scaled_inputs(descriptors):
+    """Return descriptors (n, N_DESCRIPTORS), shifted, scaled and compressed like inputs of the package's network."""
+    surrogate = load_surrogate()
+    x = (np.asarray(descriptors, float) - surrogate.median) * surrogate.per_scale
+    return x / (1.0 + x * x) ** 0.25
 
 
 def random_friction(random):
@@ -72,27 +86,79 @@ def is_special(found):
     return found.numbers[OVERLAPS] > 1 or found.descriptors[_KURTOSIS] < _DOUBLE
 
 
-def draw_positions(random, exact: ExactPatches, count=POSITIONS):
-    """Return the list of patches (`Found`) at random positions of the wheelset."""
-    half, drawn = exact.model.geometry.half_distance, []
-    aside = exact.model.geometry.rail_distance - half
+def draw_positions(random, exact: ExactPatches, count=POSITIONS, curving=0.0):
+    """Return the list of patches (`Found`) at random positions of the wheelset.
+
+    A share ``curving`` of the positions is drawn as for a leading wheel in a narrow curve (`_in_curve`)."""
+    drawn = []
     for _ in range(count):
-        yaw = 0.0 if random.random() < 0.25 else float(np.clip(random.normal(0.0, 6e-3), -0.024, 0.024))
-        axle = axle_of(yaw, random.normal(0.0, 2.5e-3))
-        y = random.uniform(-9e-3, 14e-3) if random.random() < 0.6 else random.uniform(2e-3, 12e-3)
-        y += aside - 0.0105  # 0.0105 m: the usual value of ``aside``, for which the range of y was chosen
-        z = exact.touch(y, axle) - log_uniform(random, 4e-6, 2e-4) * random.choice([1.0, 1.0, 2.0])
+        if curving and random.random() < curving:
+            y, z, axle = _in_curve(random, exact)
+        else:
+            y, axle, depth = _anywhere(random, exact)
+            z = exact.touch(y, axle) - depth
         drawn += [one for one in exact.find(y, z, axle) if is_wanted(exact, one)]
     return drawn
 
 
-def choose(random, drawn, count):
-    """Select ``count`` patches evenly over contact angle; a share `SPECIAL` has several overlaps or a double shape."""
+def _centre(exact):
+    """Return the distance (m) to add to the lateral positions that are chosen for the usual width of the track."""
+    return exact.model.geometry.rail_distance - exact.model.geometry.half_distance - 0.0105
+
+
+def _anywhere(random, exact):
+    """Return a random lateral position (m), unit vector of the axle, and depth below first touch (m)."""
+    yaw = 0.0 if random.random() < 0.25 else float(np.clip(random.normal(0.0, 6e-3), -0.024, 0.024))
+    axle = axle_of(yaw, random.normal(0.0, 2.5e-3))
+    y = random.uniform(-9e-3, 14e-3) if random.random() < 0.6 else random.uniform(2e-3, 12e-3)
+    return y + _centre(exact), axle, log_uniform(random, 4e-6, 2e-4) * random.choice([1.0, 1.0, 2.0])
+
+
+def _in_curve(random, exact):
+    """Return a random position (y, z, unit vector of the axle) of the outer wheel of a leading wheelset in a curve.
+
+    The wheel has an angle of attack, and a mean contact angle between those of tread and flank. In a tenth of the
+    positions the wheelset rolls backward, so that the sign of the angle of attack is opposite."""
+    yaw = -random.uniform(0.0, _MOST_ATTACK) * random.choice([-1.0] + 9 * [1.0])
+    axle, depth = axle_of(yaw, random.normal(4e-4, 9e-4)), log_uniform(random, 4e-5, 1.7e-4)
+    angle, low, high = random.uniform(*_ROOT_ANGLES), _centre(exact) - 2e-3, _centre(exact) + 14e-3
+    while high - low > 5e-6:
+        y = 0.5 * (low + high)
+        low, high = (low, y) if _mean_angle(exact, y, axle, depth) > angle else (y, high)
+    y = random.uniform(low - 1e-5, high + 1e-5)
+    return y, exact.touch(y, axle) - depth, axle
+
+
+def _mean_angle(exact, y, axle, depth):
+    """Return the contact angle of all patches at a position, rad, weighted by their loads; infinite without patches."""
+    found = exact.find(y, exact.touch(y, axle) - depth, axle)
+    load = sum(one.numbers[LOAD] for one in found)
+    return sum(one.numbers[LOAD] * one.shape.angle for one in found) / load if load > 0.0 else math.inf
+
+
+def choose(random, drawn, count, far=0.0):
+    """Select ``count`` patches evenly over contact angle; a share `SPECIAL` has several overlaps or a double shape.
+
+    A share ``far`` of the patches is selected before, such that their descriptors are far from each other."""
+    if far:
+        apart = _far_apart(random, np.array([scaled_inputs(one.descriptors) for one in drawn]), int(round(far * count)))
+        rest = [one for k, one in enumerate(drawn) if k not in set(apart)]
+        return [drawn[k] for k in apart] + choose(random, rest, count - len(apart))
     special = np.array([is_special(one) for one in drawn])
     n = min(int(round(SPECIAL * count)), int(special.sum()))
     chosen = _evenly(random, drawn, np.flatnonzero(special), n)
     chosen += _evenly(random, drawn, np.flatnonzero(~special), count - n)
     return [drawn[k] for k in chosen]
+
+
+def _far_apart(random, inputs, count):
+    """Return indices of at most ``count`` rows of ``inputs``; each is the one farthest from those selected before."""
+    count = min(count, len(inputs))
+    chosen, least = [], np.full(len(inputs), np.inf)
+    for _ in range(count):
+        chosen.append(int(least.argmax()) if chosen else int(random.integers(len(inputs))))
+        least = np.minimum(least, ((inputs - inputs[chosen[-1]]) ** 2).sum(1))
+    return chosen
 
 
 def _evenly(random, drawn, among, count):
