@@ -13,7 +13,7 @@ import pytest
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.profiles.standards import named_profile
-from wrcore.scene import creep
+from wrcore.scene.parts import creep
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"

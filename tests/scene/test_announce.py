@@ -5,12 +5,12 @@ import time
 import pytest
 
 from tests.conftest import ELLIPTIC
-from wrcore.errors.messages import _say_once, say_if_long
+from wrcore.errors.messages import _say_once, say_if_long, tell
 from wrcore.kernels.jit import jit
 from wrcore.scene import compile as scene_compile
-from wrcore.scene import creep
-from wrcore.scene.creep import announce, creep_of
 from wrcore.scene.description import load_scene
+from wrcore.scene.parts import creep
+from wrcore.scene.parts.creep import creep_of
 
 
 @pytest.fixture
@@ -29,6 +29,7 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
     monkeypatch.setattr(creep, "kept_tables", lambda *_: ["a table"] if there else [])
     monkeypatch.setattr(creep, "ensure_table", ensure)
+    _say_once.cache_clear()
     with pytest.raises(Known):
         creep_of(scene, None)
     said = capsys.readouterr().err.splitlines()
@@ -48,7 +49,8 @@ def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
 def test_no_line_where_none_is_wanted(monkeypatch, capsys):
     monkeypatch.setenv("WRCORE_PROGRESS", "0")
     monkeypatch.setattr("wrcore.errors.messages.PATIENCE", 0.0)
-    announce("work")
+    _say_once.cache_clear()
+    tell("work")
     with say_if_long("work that takes long"):
         time.sleep(0.05)
     assert capsys.readouterr().err == ""

@@ -26,9 +26,9 @@ from wrcore.run import simulation
 from wrcore.run.checkpoints import digest_of, model_fingerprint
 from wrcore.run.simulate import simulate
 from wrcore.scene import compile as scene_compile
-from wrcore.scene import creep
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
+from wrcore.scene.parts import creep
 from wrcore.vehicle.description import build_vehicle
 
 SUSPENDED, VEHICLES = ELLIPTIC / "suspended_wheelset.yaml", ELLIPTIC.parent / "vehicles"

@@ -9,8 +9,8 @@ from wrcore.contact.changing_rails.section_table import shape_table
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
 from wrcore.geometry.changing_rails.files import read_slices
 from wrcore.geometry.profiles.standards import named_profile
-from wrcore.scene import kept_tables
-from wrcore.scene.kept_tables import TABLE_FIELDS, kept_shape, kept_table
+from wrcore.scene.parts import kept_tables
+from wrcore.scene.parts.kept_tables import TABLE_FIELDS, kept_shape, kept_table
 
 
 def numbers(table):

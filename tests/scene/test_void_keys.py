@@ -84,7 +84,7 @@ def test_key_stated_beside_what_makes_it_void_is_refused(key, valid, value, void
 @EACH
 def test_key_of_the_scene_made_void_by_a_change_is_left_out(key, valid, value, voider, monkeypatch):
     said = []
-    monkeypatch.setattr(void_keys, "say_once", said.append)
+    monkeypatch.setattr(void_keys, "tell", said.append)
     scene = wr.load_scene(scene_with({**valid, key: value}))
     assert not said
     default = wr.load_scene(scene_with(voider)).data

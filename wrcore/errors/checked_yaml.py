@@ -232,14 +232,15 @@ def kinds_in(part):
     return import_module(part["x-kinds"]).SCHEMAS if "x-kinds" in part else ()
 
 
-def validate(data, schema_name, source):
+def validate(data, schema_name, source, above=""):
     """Check data against a schema of the package and return a copy with all defaults.
 
     Integers of the schema are converted to int. An InputError of one line names source, field and expectation.
+    ``above`` is the field that holds the data.
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
-    check(data, schema, source)
+    check(data, schema, source, above)
     _fill_defaults(data, schema, schema)
     return data
 

@@ -33,7 +33,7 @@ from wrcore.run.output.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start
 from wrcore.run.state import State
 from wrcore.scene.description import Scene
-from wrcore.scene.pairs import find_file, with_names
+from wrcore.scene.reader import existing_file, find_file
 
 LIBRARIES = {2: ("pythonfmu", "Fmi2Slave", "Real", "Fmi2"), 3: ("pythonfmu3", "Fmi3Slave", "Float64", "Fmi3")}
 """Library of each FMI version: its name, its class of a slave, its class of a number, and the prefix of its names."""
@@ -233,13 +233,27 @@ def _pack_scene(scene, folder):
         if any(str(listed) in names for listed in profiles_in(path)):  # slices, whose profiles were renamed
             text = with_profiles(path, lambda name, at=Path(path).parent: names.get(str(at / name), name))
             (folder / names[path]).write_text(text)
-    content = _with_laws(with_names(scene.data, Path(scene.source).parent, names), laws)
+    content = _with_laws(_with_files(scene.data, Path(scene.source).parent, names), laws)
     vehicle = scene.data["vehicle"]["parameters"]
     if isinstance(vehicle, str) and any("law" in item for item in scene.vehicle.data["elements"]):
         path = find_file(vehicle, Path(scene.source).parent, scene.source, "vehicle.parameters")
         text = yaml.safe_dump(_vehicle_of(path, scene, laws), sort_keys=False)
         (folder / names[str(path)]).write_text(text, "utf-8")
     (folder / SCENE).write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")
+
+
+NAMED_BY = "parameters", "profile", "points", "slices", "table"
+"""Keys of a scene whose values may name files."""
+
+
+def _with_files(value, folder, names, key=""):
+    """Return a scene's content, or a part of it, with renamed files; ``names`` maps their paths to new names."""
+    if isinstance(value, dict):
+        return {name: _with_files(item, folder, names, name) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_with_files(item, folder, names, key) for item in value]
+    found = existing_file(value, folder) if key in NAMED_BY and isinstance(value, str) else None
+    return names.get(str(found), value)
 
 
 def _pack_laws(scene, folder, names):

@@ -15,15 +15,10 @@ from wrcore.contact.search.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.surrogate.network import load_surrogate, no_surrogate
 from wrcore.creep.laws import LAWS, USER_LAW
 from wrcore.equations.model import Model
-from wrcore.errors import InputError
 from wrcore.errors.messages import tell
-from wrcore.scene.changing_rails import sections_under_wheels, warn_of_rigid_rails
-from wrcore.scene.check_rail import read_check_rails
-from wrcore.scene.control import outputs_of, read_controls
-from wrcore.scene.creep import creep_of
-from wrcore.scene.description import Scene, friction_of
-from wrcore.scene.drive import read_drive
-from wrcore.scene.support import track_support
+from wrcore.scene.description import Scene
+from wrcore.scene.parts.changing_rails import sections_under_wheels, warn_of_rigid_rails
+from wrcore.scene.parts.creep import creep_of
 from wrcore.track.changing_rails import no_crossing
 from wrcore.track.track import TrackModel
 from wrcore.vehicle.description import GRAVITY
@@ -37,10 +32,8 @@ lookup table."""
 
 def _allow_laws(scene):
     """Test-call the user-defined laws of a scene's force elements; InputError if the scene's laws may not be run."""
-    try:
+    with scene.reader.errors_of("trust"):
         scene.laws.allow()
-    except InputError as error:
-        raise InputError(scene.source, error.field, error.expected) from None
     with scene.laws.present():
         try_laws(scene.vehicle.data["elements"], scene.vehicle.source_file)
     return True
@@ -65,7 +58,7 @@ def compile_scene(
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
-    changing = scene.crossings, scene.out_of_round, scene.corrugation
+    changing = scene.changing
     if contact["patch"] == "tabulated" and scene.detection != "spatial":
         tell(
             f"{scene.source}: contact.detection {scene.detection} beside contact.patch tabulated: each patch is solved,"
@@ -74,22 +67,22 @@ def compile_scene(
     _kept(shared, "laws", (vehicle, scene.laws), lambda: _allow_laws(scene))
     track = _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
     parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # keys of ``shared`` by identity
-    friction = friction_of(scene)
+    friction = scene.friction
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
         tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
              "largest one by 2 to 3 % of mu N, at a sixth by 14 to 19; contact.patch exact does not")  # fmt: skip
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
-    pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
     if any(changing):
         starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
-        geometries, crossing = _kept(shared, "crossing", parts, lambda: sections_under_wheels(*changing, pairs, starts))
-        geometry, plain = geometries[0], tuple(pair.geometry for pair in pairs)  # of the type of all
+        geometries, crossing = _kept(
+            shared, "crossing", parts, lambda: sections_under_wheels(*changing, scene.wheels, starts)
+        )
+        geometry, plain = geometries[0], tuple(pair.geometry for pair in scene.wheels)  # of the type of all
         if "support" not in data["track"]:
             warn_of_rigid_rails(scene.source)
-    support, elements = track_support(
-        data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
-    )
+    elements = vehicle.elements._replace(states=vehicle.elements.states + scene.support_states)
+    scene.try_control_laws()
     model = Model(
         vehicle.bodies,
         ContactModel(
@@ -110,10 +103,8 @@ def compile_scene(
         TrackModel(bool(track.tangent), track.path, track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, flexible_track=support,
-        drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
-        controls=read_controls(data, vehicle, scene.laws, scene.source), crossing=crossing,
-        check_rails=read_check_rails(data, pairs, scene.source),
+        friction=friction.rails, flexible_track=scene.support, drive=scene.drive, controls=scene.controls,
+        crossing=crossing, check_rails=scene.check_rails,
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

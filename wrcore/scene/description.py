@@ -21,28 +21,29 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import digest_of_all
+from wrcore.forces.control import Controls
+from wrcore.forces.drive import Drive
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.named_laws import Laws
 from wrcore.scene.changes import changes_of, of_a_change, set_at
-from wrcore.scene.changing_rails import (
-    PlacedCrossing,
-    read_corrugation,
-    read_crossings,
-)
-from wrcore.scene.check_rail import read_check_rails
-from wrcore.scene.control import outputs_of, read_controls
-from wrcore.scene.creep import check_creep
-from wrcore.scene.drive import read_drive
 from wrcore.scene.examples import examples_folder
-from wrcore.scene.friction import Friction, read_friction
-from wrcore.scene.out_of_round import read_out_of_round
-from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
+from wrcore.scene.parts.changing_rails import PlacedCrossing, read_corrugation, read_crossings
+from wrcore.scene.parts.check_rail import read_check_rails
+from wrcore.scene.parts.control import outputs_of, read_controls
+from wrcore.scene.parts.creep import check_creep
+from wrcore.scene.parts.drive import read_drive
+from wrcore.scene.parts.friction import Friction, read_friction
+from wrcore.scene.parts.out_of_round import read_out_of_round
+from wrcore.scene.parts.profiles import differing_pairs, wheel_and_rail
+from wrcore.scene.parts.support import read_support
+from wrcore.scene.reader import Reader
 from wrcore.scene.stored import StoredScene, texts_in
-from wrcore.scene.support import check_support
 from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
+from wrcore.track.check_rail import CheckRails
+from wrcore.track.flexible_track import FlexibleTrack, track_size
 from wrcore.vehicle.description import Vehicle, vehicle_of
 from wrcore.vehicle.train import train_of
 
@@ -100,10 +101,73 @@ class Scene:
         """Contact detection: ``planar``, ``spatial`` or ``auto``."""
         return self.data["contact"]["detection"]
 
+    # Parts that follow from `data`: they are read once, when they are first needed. With other data they are read anew.
+
     @cached_property
     def alike(self) -> WheelOnRail:
         """`WheelOnRail` of the scene's ``wheel`` on its ``rail``, for wheels that do not differ."""
-        return _alike(self.vehicle, self.wheel, self.rail, self.track)[0]
+        return _alike(self.vehicle, self.wheel, self.rail, self.track)
+
+    @cached_property
+    def wheels(self) -> tuple[WheelOnRail, ...]:
+        """`WheelOnRail` of all wheels, left and right, wheelset after wheelset; two in a vehicle without wheelsets."""
+        return self.pairs or (self.alike,) * (2 * max(1, len(self.vehicle.bodies.wheelsets)))
+
+    @property
+    def changing(self) -> tuple[Any, Any, Any]:
+        """Crossings, wheels out of round and corrugation: causes of rails that change under a wheel."""
+        return self.crossings, self.out_of_round, self.corrugation
+
+    @cached_property
+    def support(self) -> FlexibleTrack:
+        """Flexible track under each wheelset, or a rigid one."""
+        wheel = self.wheels[0] if any(self.changing) else self.alike
+        first_state = self.vehicle.elements.states
+        return read_support(self.data["track"].get("support"), wheel.rail_distance, first_state, self.reader)
+
+    @property
+    def support_states(self) -> int:
+        """Number of states of the flexible track under all wheelsets."""
+        return len(self.vehicle.bodies.wheelsets) * track_size(self.support)
+
+    @cached_property
+    def check_rails(self) -> CheckRails:
+        """Check rails of all wheelsets."""
+        return read_check_rails(self.data, self.wheels, self.reader)
+
+    @cached_property
+    def friction(self) -> Friction:
+        """Friction of the rails; at the first access user-defined laws of friction are called."""
+        return self._read_friction()
+
+    @cached_property
+    def drive(self) -> Drive:
+        """Motors, brakes and speed controller."""
+        commanded = outputs_of(self.data.get("control"))
+        return read_drive(self.data.get("drive"), self.vehicle, commanded, self.reader)
+
+    @property
+    def controls(self) -> Controls:
+        """Control laws."""
+        return self._controls_and_tests[0]
+
+    def try_control_laws(self) -> None:
+        """Call each control law with the values in the vehicle's nominal position; InputError if a call fails."""
+        for test in self._controls_and_tests[1]:
+            test()
+
+    @cached_property
+    def _read_friction(self):
+        return read_friction(self.data["contact"]["friction"], self.reader)
+
+    @cached_property
+    def _controls_and_tests(self):
+        return read_controls(self.data, self.vehicle, self.support_states, self.reader)
+
+    @property
+    def reader(self) -> Reader:
+        """`Reader` of the scene, for errors that name it."""
+        return Reader(self.source, self.laws, self.files)
 
     @checked
     def pair(self, side: Annotated[str, OneOf(SIDES)] = "left", wheelset: Annotated[int, Within(0)] = 0) -> WheelOnRail:
@@ -226,53 +290,41 @@ def _loaded(scene, asked, folders, named=(), trust=False, undecided=()):
 
 def _checked(data: dict[str, Any], source: str, laws: Laws, changes=None, undecided=()) -> Scene:
     """Return the checked scene of a file's content and of the files that it names; ``laws`` finds user functions."""
-    data, folder = validate(data, "scene", source), laws.folders[0]
+    data, reader = validate(data, "scene", source), Reader(source, laws, {})
     leave_out_void_keys(data, source, changes, undecided)
-    digests = digests_of_files(data, folder)  # before the files are read, so that a change during reading is detected
-    find = partial(find_file, folder=folder, source=source, field="vehicle.parameters")
     with laws.present():
-        vehicle = vehicle_of(data["vehicle"], find, source, laws)
+        vehicle = vehicle_of(data["vehicle"], partial(reader.file, key="vehicle.parameters"), source, laws)
         vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
-    wheel, rail = wheel_and_rail(data, folder, source)
-    check_creep(data["contact"], source, laws)
-    track = build_track(_with_points(data["track"], folder, source), source, folder, laws)
-    data["track"] = validate(data["track"], "track", source)
-    pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
-    check_support(data["track"].get("support"), source)
-    read_check_rails(data, pairs or _alike(vehicle, wheel, rail, track), source)
-    crossings = read_crossings(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
-    shapes = read_out_of_round(data, vehicle, pairs, crossings, folder, source)
-    corrugation = read_corrugation(data, crossings, shapes, source)
+    wheel, rail = wheel_and_rail(data, reader)
+    check_creep(data["contact"], reader)
+    data["track"] = validate(data["track"], "track", source, above="track")
+    track = build_track(_with_points(data["track"], reader), source, reader.folder, laws)
+    pairs = differing_pairs(data, vehicle, wheel, rail, track, reader)
+    crossings = read_crossings(data, vehicle, pairs or (_alike(vehicle, wheel, rail, track),) * 2, reader)
+    shapes = read_out_of_round(data, vehicle, pairs, crossings, reader)
+    corrugation = read_corrugation(data, crossings, shapes, reader)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
-        raise InputError(source, "track.path", expected)
+        raise reader.error("track.path", expected)
     check_bodies(data["initial"]["bodies"], vehicle, source)
-    read_friction(data["contact"]["friction"], source, laws, call=False)
     if "contact" not in (wanted := data["output"]["channels"]) and "wheel_motion" in wanted:
-        raise InputError(source, "output.channels", "expected contact beside wheel_motion")
-    read_controls(data, vehicle, laws, source, call=False)
-    read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
-    digests |= laws.files
-    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossings, shapes, corrugation, digests, laws)
+        raise reader.error("output.channels", "expected contact beside wheel_motion")
+    files = reader.files
+    scene = Scene(data, source, vehicle, wheel, rail, track, pairs, crossings, shapes, corrugation, files, laws)
+    for part in ("support", "check_rails", "_read_friction", "_controls_and_tests", "drive"):
+        getattr(scene, part)  # reads and checks the part
+    files |= laws.files
+    return scene
 
 
 def _alike(vehicle, wheel, rail, track):
-    """Return the `WheelOnRail` of the left and the right side, where all wheels and rails are equal."""
-    distance = track.rail_distance(rail)
-    return (WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, distance),) * 2
+    """Return the `WheelOnRail` of both sides, where all wheels and rails are equal."""
+    return WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, track.rail_distance(rail))
 
 
-def _with_points(track, folder, source):
+def _with_points(track, reader):
     """Return the scene's track with the absolute paths of its irregularity files."""
-    irregularity = track.get("irregularity")
-    points = irregularity.get("points") if isinstance(irregularity, dict) else None
-    names = [points] if isinstance(points, str) else points
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        return track
-    found = [str(find_file(name, folder, source, "track.irregularity.points").resolve()) for name in names]
-    return {**track, "irregularity": {**irregularity, "points": found[0] if isinstance(points, str) else found}}
-
-
-def friction_of(scene: Scene) -> Friction:
-    """Return the `Friction` of a scene's rails; a user-defined friction law is called."""
-    return read_friction(scene.data["contact"]["friction"], scene.source, scene.laws)
+    names = track.get("irregularity", {}).get("points", [])
+    names = [names] if isinstance(names, str) else names
+    found = [str(reader.file(name, "track.irregularity.points").resolve()) for name in names]
+    return {**track, "irregularity": {**track["irregularity"], "points": found}} if found else track

@@ -27,9 +27,6 @@ class VoidKey(NamedTuple):
     why: str
 
 
-say_once = cache(tell)
-"""Report a line once per process."""
-
 REFERENCES = ("scipy_", "cvode")
 """Prefixes of the names of integration methods from other packages."""
 
@@ -94,7 +91,7 @@ def leave_out_void_keys(
         beside = by if other is None else f"{by} {short(other)}"
         if not _is_changed(by, changes) or _is_changed(key, changes):
             raise InputError(source, key, f"expected no such key beside {beside}, {why}: leave it out")
-        say_once(f"{source}: {key} {short(value)} is left out: it has no effect beside {beside}")
+        tell(f"{source}: {key} {short(value)} is left out: it has no effect beside {beside}")
         above, _, last = key.rpartition(".")
         inside = _at(data, above)
         del inside[last]

@@ -24,7 +24,7 @@ from wrcore.kernels.cache import source_digest
 from wrcore.run.checks.reach import check_reach
 from wrcore.scene.changes import check_disjoint
 from wrcore.scene.description import Scene, changed_by_caller, changed_by_file
-from wrcore.scene.pairs import find_file
+from wrcore.scene.reader import find_file
 from wrcore.scene.stored import StoredScene
 from wrcore.sweep.measures import MEASURES
 
@@ -114,8 +114,10 @@ def load_sweep(
     for measure in data["measures"]:
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
-    read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
-    if isinstance(source, Mapping) and isinstance(source["scene"], StoredScene):
+    read_from = data["scene"]
+    if isinstance(read_from, str):
+        read_from = find_file(read_from, folder, name, "scene")
+    elif isinstance(source, Mapping) and isinstance(source["scene"], StoredScene):
         read_from = StoredScene(read_from)
     check_disjoint(data["keys"], name, "keys")
     keys = data["keys"]

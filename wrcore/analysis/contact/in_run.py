@@ -25,7 +25,7 @@ from wrcore.errors.messages import warn
 from wrcore.geometry.track import SIDES
 from wrcore.run.output.run import Run
 from wrcore.run.simulation import ON_RAIL
-from wrcore.scene.description import Scene, Source, friction_of, scene_of
+from wrcore.scene.description import Scene, Source, scene_of
 from wrcore.wheels.motion import WheelMotion
 
 PARTS = "vehicle", "wheel", "rail", "track", "contact"
@@ -60,7 +60,7 @@ class WheelInRun:
             raise InputError(asker, "output.channels", expected)
         check_same_everywhere(scene, asker, "run")
         contact = scene.data["contact"]
-        friction = friction_of(scene)
+        friction = scene.friction
         pair = scene.pair(side, scene.vehicle.wheelset_names.index(wheelset))
         self._wheels = LoadedWheels(
             pair.geometry, "exact", resolution, contact["slip"], **contact["material"],

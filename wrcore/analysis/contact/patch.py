@@ -14,7 +14,7 @@ from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
-from wrcore.scene.description import Source, as_scene, friction_of
+from wrcore.scene.description import Source, as_scene
 
 METHODS = ("exact", "grid")
 
@@ -124,7 +124,7 @@ def _of_scene(source, side):
     """Return geometry, material and default values of a scene, for its first wheelset."""
     scene = as_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
-    friction = friction_of(scene).largest
+    friction = scene.friction.largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
     detection = "planar" if scene.detection == "planar" else "spatial"

@@ -38,7 +38,8 @@ from wrcore.run.output.derived import creep_work, rolling_speed
 from wrcore.run.output.run import Run
 from wrcore.run.progress import counted
 from wrcore.scene.description import Scene, Source
-from wrcore.scene.friction import read_friction
+from wrcore.scene.parts.friction import read_friction
+from wrcore.scene.reader import Reader
 from wrcore.scene.stored import laws_of_stored
 
 PATCHES = "ellipse", "exact"
@@ -208,7 +209,7 @@ def _wheel_wear(run, name, late, strips, width):
 
 def _friction_of(scene, trust):
     """Return the largest coefficient of friction of a scene, for runs that do not store it."""
-    return read_friction(scene["contact"]["friction"], "scene", laws_of_stored(scene, trust)).largest
+    return read_friction(scene["contact"]["friction"], Reader("scene", laws_of_stored(scene, trust), {}))().largest
 
 
 def _on_ellipses(run, late, loss, trust, name, side):

@@ -51,7 +51,7 @@ class ShapesAlong:
         self._scene, self._grids, self._flat = scene, {}, {}
         vehicle = scene.vehicle
         self._names = vehicle.wheelset_names
-        self._pairs = scene.pairs or (scene.alike,) * (2 * len(self._names))
+        self._pairs = scene.wheels
         self._starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
 
     @cached_property

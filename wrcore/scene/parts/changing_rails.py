@@ -5,26 +5,25 @@ The module also builds the contact geometry of each wheel on changing or corruga
 
 import json
 import math
+import os
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from wrcore.contact.changing_rails.section_table import BLEND, SectionTable
 from wrcore.contact.changing_rails.sections import REACH
-from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.messages import warn
 from wrcore.geometry.changing_rails.crossing import Crossing
-from wrcore.geometry.changing_rails.files import read_slices
+from wrcore.geometry.changing_rails.files import profiles_in, read_slices
 from wrcore.geometry.changing_rails.joint import Joint
 from wrcore.geometry.changing_rails.slices import RailSlices
 from wrcore.geometry.changing_rails.switch import Switch
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.track import SIDES
-from wrcore.scene.kept_tables import kept_shape, kept_table
-from wrcore.scene.pairs import find_file
+from wrcore.scene.parts.kept_tables import kept_shape, kept_table
 from wrcore.track.changing_rails import crossing_of, layout_of_corrugation, layout_of_rail, layout_of_wheel
 
 JOINED = 1e-4
@@ -64,7 +63,7 @@ class PlacedCrossing:
         return (self.at - high, self.at - low) if self.backwards else (self.at + low, self.at + high)
 
 
-def read_crossings(data, vehicle, pairs, folder, source):
+def read_crossings(data, vehicle, pairs, reader):
     """Return a `PlacedCrossing` for each stretch where a scene's rails change, sorted along the track.
 
     ``data`` is the scene's content, checked against the schema; ``pairs`` are the `WheelOnRail` of at least one
@@ -72,39 +71,39 @@ def read_crossings(data, vehicle, pairs, folder, source):
     """
     specs, laid, known = data["track"].get("crossing", []), [], {}
     for k, spec in enumerate([specs] if isinstance(specs, dict) else specs):
-        field = "track.crossing" if isinstance(specs, dict) else f"track.crossing.{k}"
+        part = reader.at("track.crossing") if isinstance(specs, dict) else reader.at("track.crossing", k)
         what = json.dumps([spec["slices"], spec["rail"]], sort_keys=True)
         if what not in known:
-            known[what] = _rails(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
+            known[what] = _rails(spec, data["track"]["gauge_depth"], pairs, part.at("slices"))
         crossing = known[what] and PlacedCrossing(known[what], float(spec["at"]), spec["reversed"])
         if crossing is not None:
-            _check_begin(crossing, vehicle, source, f"{field}.at")
-            laid.append((crossing, field))
+            _check_begin(crossing, vehicle, part)
+            laid.append((crossing, part))
     for side, name in enumerate(SIDES):
-        along = sorted((one.ends, field) for one, field in laid if one.rails[side] is not None)
-        for ((low, high), _), ((begin, end), field) in pairwise(along):
+        along = sorted((*one.ends, part.key) for one, part in laid if one.rails[side] is not None)
+        for (low, high, _), (begin, end, key) in pairwise(along):
             if begin < high:
                 expected = f"expected stretches of the {name} rail apart, got {low:g} to {high:g} m and {begin:g} to"
-                raise InputError(source, f"{field}.at", f"{expected} {end:g} m")
+                raise reader.error(f"{key}.at", f"{expected} {end:g} m")
     return tuple(sorted((one for one, _ in laid), key=lambda one: one.ends))
 
 
-def _rails(spec, depth, pairs, folder, source, field):
+def _rails(spec, depth, pairs, reader):
     """Return the rails of a `PlacedCrossing`, or None if all slices are equal."""
-    slices = _slices(spec["slices"], folder, source, f"{field}.slices")
+    slices = _slices(spec["slices"], reader)
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     rails = [
         slices.along(pair.rail, depth) if side in sides else None for side, pair in zip(SIDES, pairs, strict=False)
     ]
     for rail, pair in zip(rails, pairs, strict=False):
         if rail is not None:
-            _check_joints(rail, pair.rail, source, f"{field}.slices")
-            _check_surface(rail, source, f"{field}.slices")
-            _warn_of_swings(rail, f"{source}: {field}.slices")
+            _check_joints(rail, pair.rail, reader)
+            _check_surface(rail, reader)
+            _warn_of_swings(rail, reader)
     return None if slices.alike else tuple(rails)
 
 
-def _check_begin(crossing, vehicle, source, field):
+def _check_begin(crossing, vehicle, reader):
     """Raise an InputError if a wheelset stands on the crossing at the beginning of the run."""
     low, high = crossing.ends
     for name, x in zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True):
@@ -112,7 +111,7 @@ def _check_begin(crossing, vehicle, source, field):
             expected = (
                 f"expected no wheelset on it at the beginning, got {name} at {x:g} m, it from {low:g} to {high:g} m"
             )
-            raise InputError(source, field, expected)
+            raise reader.error("at", expected)
 
 
 MADE = {
@@ -123,25 +122,36 @@ MADE = {
 """Rails made by a formula: class, lower and upper bound of its dimension, and text of the error outside the bounds."""
 
 
-def _slices(spec, folder, source, field) -> RailSlices:
+def _slices(spec, reader) -> RailSlices:
     """Return the slices that a scene names: a file, or a rail made by a formula."""
     how = spec if isinstance(spec, dict) else {"slices": spec}
     named = how.get("slices")
     kind, colon, value = named.partition(":") if isinstance(named, str) else ("", "", "")
     if colon and kind in MADE:
         if others := sorted(map(str, how.keys() - {"slices"})):
-            raise InputError(source, f"{field}.{others[0]}", f"expected no such key beside {named}, made by a formula")
+            raise reader.error(others[0], f"expected no such key beside {named}, made by a formula")
         made, low, high, expected = MADE[kind]
         if not low <= (size := parse_ratio(value)) <= high:
-            raise InputError(source, field, f"expected {expected}, got {spec!r}")
+            raise reader.error("", f"expected {expected}, got {spec!r}")
         return made(size).rail(f"{kind}:{value}")
-    if not isinstance(named, str):
-        raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
-    path = find_file(named, folder, source, field)
-    return read_slices({**how, "slices": str(path)}, described_by=f"{source}: {field}")
+    return slices_named(spec, "rail", reader)[0]
 
 
-def _check_joints(slices, plain, source, field):
+def slices_named(spec, kind, reader):
+    """Return slices of the kind "rail" or "wheel" from the file that a part of a scene names, and the path of the file.
+
+    The part is the name of the file, or a mapping with the name as ``slices`` and with further keys.
+    """
+    how = spec if isinstance(spec, dict) else {"slices": spec}
+    if not isinstance(how.get("slices"), str):
+        raise reader.error("", f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
+    path = reader.file(how["slices"])
+    for profile in filter(os.path.isfile, profiles_in(path)):
+        reader.record(profile)
+    return read_slices({**how, "slices": str(path)}, kind, f"{reader.source}: {reader.key}"), path
+
+
+def _check_joints(slices, plain, reader):
     """Raise an InputError if the first or the last slice does not continue the plain rail within `JOINED`."""
     low, high, depth = RUNNING
     u = np.arange(low, high, 1e-3)
@@ -153,10 +163,10 @@ def _check_joints(slices, plain, source, field):
         if off[worst] > JOINED:
             got = f"{1e3 * off[worst]:.3f} mm" if off[worst] < math.inf else "none"
             expected = f"expected a {which} slice within {1e3 * JOINED:g} mm of the scene's rail {plain.name}"
-            raise InputError(source, field, f"{expected}, got {got} at u = {u[worst]:.3f} m")
+            raise reader.error("", f"{expected}, got {got} at u = {u[worst]:.3f} m")
 
 
-def _check_surface(slices, source, field):
+def _check_surface(slices, reader):
     """Raise an InputError if a rail has no head under the wheels, or a head that is too steep along the track."""
     between = 0.5 * (slices.s[1:] + slices.s[:-1])
     s, u = np.sort(np.concatenate([slices.s, between])), np.arange(RUNNING[0], BENEATH, 1e-3)
@@ -165,15 +175,15 @@ def _check_surface(slices, source, field):
         top = np.max(f, axis=1, where=np.isfinite(f), initial=-np.inf)
         if (gone := np.flatnonzero(top < BELOW)).size:
             expected = f"expected a head under the wheels everywhere, got none at s = {part[gone[0]]:g} m"
-            raise InputError(source, field, expected)
+            raise reader.error("", expected)
         steep = np.max(np.abs(along), axis=1, where=f > top[:, None] - CROWN, initial=0.0)
         worst = int(np.argmax(steep))
         if not steep[worst] < STEEPEST_ALONG:
             expected = f"expected heads that rise less than {STEEPEST_ALONG:g} along the track"
-            raise InputError(source, field, f"{expected}, got {steep[worst]:.3g} at s = {part[worst]:g} m")
+            raise reader.error("", f"{expected}, got {steep[worst]:.3g} at s = {part[worst]:g} m")
 
 
-def _warn_of_swings(slices, where):
+def _warn_of_swings(slices, reader):
     """Warn if the splines through the slices leave the range of heights of both neighbouring slices.
 
     A notch between two heads that moves laterally from slice to slice is no overshoot.
@@ -189,10 +199,10 @@ def _warn_of_swings(slices, where):
         worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
     if worst[0] > SWING:
         text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
-        warn(f"{where}: {text}: add slices there")
+        warn(f"{reader.source}: {reader.key}: {text}: add slices there")
 
 
-def read_corrugation(data, crossings, shapes, source):
+def read_corrugation(data, crossings, shapes, reader):
     """Return the `Corrugation` that a scene's content describes, or None for smooth rails."""
     spec = data["track"].get("corrugation")
     if spec is None:
@@ -203,11 +213,11 @@ def read_corrugation(data, crossings, shapes, source):
         if side in sides and (changes or any(shape for shape, _ in shapes[k::2])):
             other = "track.crossing" if changes else "wheels out of round"
             expected = f"expected no {other} on the {side} rail where it is corrugated"
-            raise InputError(source, "track.corrugation.rail", expected)
+            raise reader.error("track.corrugation.rail", expected)
     slope = 2.0 * math.pi * spec["amplitude"] / spec["wavelength"]
     if not slope < STEEPEST_ALONG:
         expected = f"expected a wave that rises less than {STEEPEST_ALONG:g}, got {slope:.3g}"
-        raise InputError(source, "track.corrugation.amplitude", expected)
+        raise reader.error("track.corrugation.amplitude", expected)
     return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
 
 
@@ -263,7 +273,6 @@ def _on_plain_rail(pair, tables):
     return tables[0].geometry._replace(zone_planar_errors=errors)
 
 
-@cache
 def warn_of_rigid_rails(source):
-    """Warn once that impact forces on rigid rails are meaningless."""
+    """Warn that impact forces on rigid rails are meaningless."""
     warn(f"{source}: impact on rigid rails is no result; track.support says how the track gives")

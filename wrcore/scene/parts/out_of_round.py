@@ -8,12 +8,10 @@ from wrcore.contact.changing_rails.out_of_round import SlicedWheel
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
 from wrcore.errors.messages import warn
-from wrcore.geometry.changing_rails.files import read_slices
 from wrcore.geometry.changing_rails.slices import TURN
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.track import SIDES
-from wrcore.scene.changing_rails import STEEPEST_ALONG
-from wrcore.scene.pairs import find_file
+from wrcore.scene.parts.changing_rails import STEEPEST_ALONG, slices_named
 
 LARGEST = 0.01
 """Largest accepted deviation from the round wheel, or from the scene's wheel profile, m; it detects wrong units."""
@@ -26,7 +24,7 @@ NARROWER = 2e-3
 """Distance before the end of the wheel's profile; wrcore warns if sections end further from it, m."""
 
 
-def read_out_of_round(data, vehicle, pairs, crossings, folder, source):
+def read_out_of_round(data, vehicle, pairs, crossings, reader):
     """Return (shape, angle) of each wheel, left and right, wheelset after wheelset; empty if all wheels are round.
 
     The shape is an `OutOfRound` or a `SlicedWheel`, or None for a round wheel; the angle (rad) is the wheel's angle at
@@ -35,65 +33,60 @@ def read_out_of_round(data, vehicle, pairs, crossings, folder, source):
     shapes, known = [], {}
     for k, pair in enumerate(pairs):
         side, name = list(SIDES)[k % 2], vehicle.wheelset_names[k // 2]
-        field, spec = f"wheel.{side}.out_of_round", data["wheel"].get(side, {}).get("out_of_round")
+        part, spec = reader.at("wheel", side), data["wheel"].get(side, {}).get("out_of_round")
         single = data["wheel"].get("wheelsets", {}).get(name, {}).get(side, {})
         if "out_of_round" in single:
-            field, spec = f"wheel.wheelsets.{name}.{side}.out_of_round", single["out_of_round"]
+            part, spec = reader.at("wheel.wheelsets", name, side), single["out_of_round"]
         shape, angle = None, 0.0
         if spec:
             key = json.dumps({**spec, "angle": 0.0, "radius": pair.rolling_radius}, sort_keys=True), id(pair.wheel)
             if key not in known:
-                known[key] = _shape(spec, pair, field, folder, source)
+                known[key] = _shape(spec, pair, part.at("out_of_round"))
             shape, angle = known[key], float(spec["angle"])
             if any(crossing.rails[k % 2] is not None for crossing in crossings):
                 expected = f"expected a round wheel on the {side} rail, where track.crossing changes it"
-                raise InputError(source, field, expected)
+                raise part.error("out_of_round", expected)
         shapes.append((shape, angle))
     if not any(shape for shape, _ in shapes):
         return ()
     return tuple(shapes)
 
 
-def _shape(spec, pair, field, folder, source):
+def _shape(spec, pair, reader):
     """Return the shape that ``out_of_round`` of one wheel describes."""
     if "slices" in spec:
-        return _sliced(spec, pair, field, folder, source)
+        return _sliced(spec, pair, reader)
     radius = pair.rolling_radius
     flats = tuple(Flat(one["length"], one.get("depth"), one["at"]) for one in spec["flats"])
     for k, flat in enumerate(flats):
         if not flat.length < radius:
             expected = f"expected less than the wheel's radius, {radius:g} m, got {flat.length:g}"
-            raise InputError(source, f"{field}.flats.{k}.length", expected)
+            raise reader.error(f"flats.{k}.length", expected)
     waves = [Wave(one["order"], one["amplitude"], one["phase"]) for one in spec["polygon"]]
     if "table" in spec:
-        waves.append(_measured(find_file(spec["table"], folder, source, f"{field}.table")))
+        waves.append(_measured(reader.file(spec["table"], "table")))
     if not flats and not waves:
-        raise InputError(source, field, "expected flats, polygon, table or slices, got none")
+        raise reader.error("", "expected flats, polygon, table or slices, got none")
     shape = OutOfRound(radius, flats, tuple(waves))
     around = np.linspace(0.0, TURN, 20001)
-    _check_slope(np.diff(shape.deviation(around)) / (radius * around[1]), field, source)
+    _check_slope(np.diff(shape.deviation(around)) / (radius * around[1]), reader)
     return shape
 
 
-def _check_slope(slopes, field, source):
+def _check_slope(slopes, reader):
     """Raise an InputError if a slope of the wheel's surface along the circumference reaches `STEEPEST_ALONG`."""
     slope = np.abs(slopes).max()
     if not slope < STEEPEST_ALONG:
         expected = f"expected a surface that rises less than {STEEPEST_ALONG:g} along the wheel, got {slope:.3g}"
-        raise InputError(source, field, expected)
+        raise reader.error("", expected)
 
 
-def _sliced(spec, pair, field, folder, source):
+def _sliced(spec, pair, reader):
     """Return the `SlicedWheel` of a file of slices; InputError if it does not fit the scene's wheel profile."""
     others = [name for name in ("flats", "polygon", "table") if spec.get(name)]
     if others:
-        raise InputError(source, f"{field}.{others[0]}", "expected nothing beside slices, which are the whole wheel")
-    how = spec["slices"] if isinstance(spec["slices"], dict) else {"slices": spec["slices"]}
-    if not isinstance(how.get("slices"), str):
-        expected = f"expected a file of slices, or {{slices: FILE, ...}}, got {spec['slices']!r}"
-        raise InputError(source, f"{field}.slices", expected)
-    path = find_file(how["slices"], folder, source, f"{field}.slices")
-    slices = read_slices({**how, "slices": str(path)}, "wheel", f"{source}: {field}.slices")
+        raise reader.error(others[0], "expected nothing beside slices, which are the whole wheel")
+    slices, path = slices_named(spec["slices"], "wheel", reader.at("slices"))
     shape, wheel = SlicedWheel(slices, pair.rolling_radius), pair.wheel
     strips = wheel.u[:: max(round(1e-3 / wheel.spacing), 1)]
     first, last = shape.within(strips)
@@ -109,8 +102,8 @@ def _sliced(spec, pair, field, folder, source):
     if not off <= LARGEST:
         expected = f"expected sections within {LARGEST:g} m of the scene's wheel {wheel.name}, got {off:.3g} m"
         raise InputError(path, "profile", expected)
-    _check_slope(rates / pair.rolling_radius, field, source)
-    _check_slope(np.diff(f, axis=0) / (pair.rolling_radius * around[1]), field, source)  # also where the turn closes
+    _check_slope(rates / pair.rolling_radius, reader)
+    _check_slope(np.diff(f, axis=0) / (pair.rolling_radius * around[1]), reader)  # also where the turn closes
     return shape
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from wrcore.errors import InputError
-from wrcore.track.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
+from wrcore.track.flexible_track import RAILS, FlexibleTrack, rigid_track
 
 SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # sleeper freedoms, after those of the rails
 
@@ -14,32 +13,16 @@ accelerates the rail by 1e-5 m/s^2, and no static equilibrium is found (suspende
 1e12 N/m)."""
 
 
-def check_support(spec, source):
-    """Raise an InputError if values of ``track.support``, checked against the schema, contradict each other."""
-    if spec is None:
-        return
-    mass = spec["rail"]["mass"]
-    if 0.0 < mass < LEAST_RAIL_MASS:
-        expected = f"expected at least {LEAST_RAIL_MASS:g} kg, or 0 for rails without mass, got {mass:g}"
-        raise InputError(source, "track.support.rail.mass", expected)
-    if mass > 0.0:
-        return
-    if "sleeper" in spec:
-        raise InputError(source, "track.support.rail.mass", "expected a mass above 0 in kg on a sleeper")
-    for direction in ("lateral", "vertical"):
-        if spec["rail"][direction]["damping"] == 0.0:
-            expected = "expected a damping above 0 in N s/m under a rail without mass"
-            raise InputError(source, f"track.support.rail.{direction}.damping", expected)
-
-
-def track_support(spec, half_distance, elements, wheelsets):
-    """Return the `FlexibleTrack` under each wheelset, and the elements with the track's states added to their count.
+def read_support(spec, half_distance, first_state, reader):
+    """Return the `FlexibleTrack` under each wheelset from a scene's ``track.support``, or `rigid_track` if it is None.
 
     ``half_distance`` is the lateral distance of each rail from the track's centre line, m. Each half of the ballast is
-    taken to support the sleeper under one rail.
+    taken to support the sleeper under one rail. ``first_state`` is the index of the track's first state after the
+    states of the bodies. InputError if values contradict each other.
     """
     if spec is None:
-        return rigid_track(), elements
+        return rigid_track()
+    _check(spec, reader.at("track.support.rail"))
     rail, sleeper = spec["rail"], spec.get("sleeper")
     d = RAILS + (3 if sleeper else 0)
     mass, matrices = np.full(d, float(rail["mass"])), (np.zeros((d, d)), np.zeros((d, d)))
@@ -52,8 +35,20 @@ def track_support(spec, half_distance, elements, wheelsets):
         if sleeper:
             _add(matrices, sleeper["vertical"], foot, 0.5)
             _add(matrices, sleeper["lateral"], {SLEEPER_Y: 1.0}, 0.5)
-    support = FlexibleTrack(mass, *matrices, elements.states)
-    return support, elements._replace(states=elements.states + wheelsets * track_size(support))
+    return FlexibleTrack(mass, *matrices, first_state)
+
+
+def _check(spec, reader):
+    """Raise an InputError if values of ``track.support`` contradict each other."""
+    mass = spec["rail"]["mass"]
+    if 0.0 < mass < LEAST_RAIL_MASS:
+        expected = f"expected at least {LEAST_RAIL_MASS:g} kg, or 0 for rails without mass, got {mass:g}"
+        raise reader.error("mass", expected)
+    if mass == 0.0 and "sleeper" in spec:
+        raise reader.error("mass", "expected a mass above 0 in kg on a sleeper")
+    for direction in ("lateral", "vertical"):
+        if mass == 0.0 and spec["rail"][direction]["damping"] == 0.0:
+            raise reader.error(f"{direction}.damping", "expected a damping above 0 in N s/m under a rail without mass")
 
 
 def _add(matrices, spring, stretch, share=1.0):

@@ -1,0 +1,1 @@
+"""Readers of the parts of a scene: one file per part."""
