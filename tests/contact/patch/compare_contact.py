@@ -18,6 +18,7 @@ import pandas as pd
 from tests.analysis.contact.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.contact.patch.model import STRIPS
 from wrcore.contact.search import reduction as columns
 
 QUANTITIES = {
@@ -58,7 +59,7 @@ def errors(name, resolution, patch="exact"):
     surfaces, creepages = (LoadedWheels(geometry, patch, resolution, slip) for slip in ("surfaces", "creepages"))
     table = contact.compare(whole_model(surfaces), cases, geometry)
     table["force"] = math.nan
-    if not math.isnan(sum(case.xi * case.fx for case in cases)):  # none in the file that is distributed
+    if not math.isnan(sum(case.xi * case.fx for case in cases)) and patch in STRIPS:  # none in the distributed file
         table["force"] = contact.compare(with_creepages(creepages), cases, geometry)["force"]
         without = contact.compare(whole_model(surfaces, lag=True), cases, geometry)
         table["without_lag"], table["curved_without_lag"] = without["surface_force"], without["curved_force"]
@@ -82,7 +83,7 @@ def main():
     """Print the distributions of all sets that are present."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", nargs="?", help="folder with the reference files")
-    parser.add_argument("--patch", default="exact", choices=("exact", "tabulated"))
+    parser.add_argument("--patch", default="exact", choices=("exact", "tabulated", "surrogate"))
     parser.add_argument("--resolution", nargs="*", default=RESOLUTIONS, choices=RESOLUTIONS)
     chosen = parser.parse_args()
     if chosen.folder:
@@ -90,7 +91,8 @@ def main():
     parts = {}
     for name in contact.SETS:
         if comparable(name) and contact.geometry(name) is not None:
-            parts |= {(name, level): distributions(errors(name, level, chosen.patch)) for level in chosen.resolution}
+            levels = chosen.resolution if chosen.patch in STRIPS else ["middle"]
+            parts |= {(name, level): distributions(errors(name, level, chosen.patch)) for level in levels}
     table = pd.concat(parts, names=["set", "resolution"]).reset_index(["set", "resolution"])
     print(table.to_markdown(index=False, floatfmt=".3g"))
 
