@@ -132,7 +132,7 @@ def test_farthest_candidate_is_kept(monkeypatch):
     monkeypatch.setattr(
         patches, "_draw_candidate", lambda *given: patches._Candidate(Pair(None, ""), None, next(drawn))
     )
-    monkeypatch.setattr(patches, "draw_positions", lambda random, exact, count, curving: [One(5.0)])
+    monkeypatch.setattr(patches, "draw_positions", lambda random, exact, count, *shares: [One(5.0)])
     monkeypatch.setattr(patches, "scaled_inputs", lambda rows: np.asarray(rows, float))
     best, distance = patches._keep_farthest(None, SMALL._replace(candidates=3), np.zeros((4, 38)))
     assert [one.descriptors[0] for one in best.drawn] == [3.0, 3.0, 3.0, 5.0]  # and those at its other positions
@@ -150,6 +150,15 @@ def test_positions_in_curves_have_evenly_spread_contact_angles():
         angles.append(np.average([one.shape.angle for one in found], weights=load))
     counts, _ = np.histogram(angles, [0.0, 0.4, 0.7, 1.1])
     assert counts.sum() > 55 and counts.min() >= 12
+
+
+def test_positions_near_the_centre_are_within_four_millimetres():
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    exact, random = ExactPatches(pair, 0.3), np.random.default_rng(4)
+    drawn = positions.draw_positions(random, exact, 60, centred=1.0)
+    y = np.array([one.position[0] for one in drawn]) - positions._centre(exact)
+    assert len(drawn) > 40
+    assert -4e-3 <= y.min() < -2e-3 and 2e-3 < y.max() <= 4e-3
 
 
 def test_selected_patches_are_far_from_each_other():

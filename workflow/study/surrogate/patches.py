@@ -72,6 +72,10 @@ class Sampling(NamedTuple):
     """Share of the random positions that are drawn as in narrow curves."""
     far: float = 0.0
     """Share of the single patches of a pair that are selected such that they are far from each other."""
+    centred: float = 0.0
+    """Share of the random positions that are drawn near the centre of a straight track."""
+    twins: float = TWINS
+    """Share of a pair's patches that are twins."""
 
 
 def distances(descriptors, others):
@@ -98,7 +102,7 @@ def _draw_candidate(random, sampling, positions=POSITIONS):
     while True:
         pair = random_pair(random, sampling.measured, sampling.new_share)
         exact = ExactPatches(pair.on_rail, random_friction(random))
-        drawn = draw_positions(random, exact, positions, sampling.curving)
+        drawn = draw_positions(random, exact, positions, sampling.curving, sampling.centred)
         if len(drawn) * POSITIONS >= LEAST_DRAWN * positions:
             return _Candidate(pair, exact, drawn)
 
@@ -116,8 +120,8 @@ def _keep_farthest(random, sampling, known):
         distance = float(np.median(distances(scaled_inputs(some), known)))
         if distance > farthest:
             best, farthest = one, distance
-    drawn = best.drawn + draw_positions(random, best.exact, POSITIONS - SCORED_POSITIONS, sampling.curving)
-    return best._replace(drawn=drawn), farthest
+    rest = draw_positions(random, best.exact, POSITIONS - SCORED_POSITIONS, sampling.curving, sampling.centred)
+    return best._replace(drawn=best.drawn + rest), farthest
 
 
 def _solved(random, exact, found, is_solved):
@@ -147,7 +151,7 @@ def pair_patches(random, candidate, sampling, number):
     The two patches of a pair of twins are successive rows."""
     exact, rows, failed = candidate.exact, [], 0
     count = sampling.pair_patches or (PAIR_PATCHES if sampling.is_solved else UNSOLVED_PATCHES)
-    n = int(round(0.5 * TWINS * count))
+    n = int(round(0.5 * sampling.twins * count))
     singles = choose(random, candidate.drawn, count - 2 * n, sampling.far)
     groups = [((one,), 0.0) for one in singles]
     groups += [((one, twin), step) for one, twin, step in choose_twins(random, exact, candidate.drawn, n)]
@@ -221,6 +225,10 @@ def _options():
                         f" {NEW_WHEELS} and {NEW_RAILS})")  # fmt: skip
     parser.add_argument("--curving", type=float, default=0.0, help="share of the positions that are drawn as in narrow"
                         " curves (default: 0)")  # fmt: skip
+    parser.add_argument("--centred", type=float, default=0.0, help="share of the positions that are drawn near the"
+                        " centre of a straight track (default: 0)")  # fmt: skip
+    parser.add_argument("--twins", type=float, default=TWINS, help="share of the patches that are twins, neighbours of"
+                        " each other (%(default)s)")  # fmt: skip
     parser.add_argument("--far", type=float, default=0.0, help="share of the single patches of a pair that are selected"
                         " to be far from each other (default: 0)")  # fmt: skip
     parser.add_argument("--profiles", type=Path, help="folder of measured profiles to start from")
@@ -232,9 +240,11 @@ def _options():
             parser.error(f"--{name}: expected at least {least}, got {getattr(asked, name)}")
     if asked.pair_patches < 0:
         parser.error(f"--pair-patches: expected at least 1, got {asked.pair_patches}")
-    for name in ("new", "curving", "far"):
+    for name in ("new", "curving", "centred", "twins", "far"):
         if not 0.0 <= getattr(asked, name) <= 1.0:
             parser.error(f"--{name}: expected a share from 0 to 1, got {getattr(asked, name)}")
+    if asked.curving + asked.centred > 1.0:
+        parser.error(f"--centred: expected at most 1 with --curving, got {asked.curving + asked.centred}")
     return parser, asked
 
 
@@ -254,11 +264,13 @@ def main():
             reference = np.concatenate([shards.read(path)["descriptors"] for path in paths])
             settings["reference"] = shards.digest_of(paths)
         settings |= {
-            name: getattr(asked, name) for name in ("new", "pair_patches", "curving", "far") if getattr(asked, name)
+            name: getattr(asked, name)
+            for name in ("new", "pair_patches", "curving", "centred", "far", "twins")
+            if getattr(asked, name) != parser.get_default(name)
         }
         sampling = Sampling(
             asked.seed, asked.shard, asked.candidates, not asked.unsolved, measured, reference, asked.new,
-            asked.pair_patches, asked.curving, asked.far,
+            asked.pair_patches, asked.curving, asked.far, asked.centred, asked.twins,
         )  # fmt: skip
         write_shards(asked.folder, asked.count, sampling, asked.part, settings,
                      lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip

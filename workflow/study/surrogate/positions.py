@@ -86,14 +86,19 @@ def is_special(found):
     return found.numbers[OVERLAPS] > 1 or found.descriptors[_KURTOSIS] < _DOUBLE
 
 
-def draw_positions(random, exact: ExactPatches, count=POSITIONS, curving=0.0):
+def draw_positions(random, exact: ExactPatches, count=POSITIONS, curving=0.0, centred=0.0):
     """Return the list of patches (`Found`) at random positions of the wheelset.
 
-    A share ``curving`` of the positions is drawn as for a leading wheel in a narrow curve (`_in_curve`)."""
+    A share ``curving`` of the positions is drawn as for a leading wheel in a narrow curve (`_in_curve`), a share
+    ``centred`` as for a wheelset that runs near the centre of a straight track."""
     drawn = []
     for _ in range(count):
-        if curving and random.random() < curving:
+        kind = random.random() if curving or centred else 1.0
+        if kind < curving:
             y, z, axle = _in_curve(random, exact)
+        elif kind < curving + centred:
+            y, axle, depth = _near_centre(random, exact)
+            z = exact.touch(y, axle) - depth
         else:
             y, axle, depth = _anywhere(random, exact)
             z = exact.touch(y, axle) - depth
@@ -112,6 +117,13 @@ def _anywhere(random, exact):
     axle = axle_of(yaw, random.normal(0.0, 2.5e-3))
     y = random.uniform(-9e-3, 14e-3) if random.random() < 0.6 else random.uniform(2e-3, 12e-3)
     return y + _centre(exact), axle, log_uniform(random, 4e-6, 2e-4) * random.choice([1.0, 1.0, 2.0])
+
+
+def _near_centre(random, exact):
+    """Return a random lateral position (m) within 4 mm of the track's centre, unit vector of the axle, and depth below
+    first touch (m)."""
+    axle = axle_of(random.normal(0.0, 3e-3), random.normal(0.0, 5e-4))
+    return random.uniform(-4e-3, 4e-3) + _centre(exact), axle, log_uniform(random, 2e-5, 1.2e-4)
 
 
 def _in_curve(random, exact):
