@@ -19,6 +19,7 @@ SCENE = SCENES / "suspended_wheelset.yaml"
 TABLE = "pyproject.toml"
 """A file that stands for a creep table, which loading a scene does not read."""
 
+FALLING = "contact.friction.falling"
 TANGENT = {"track.path": "tangent"}
 CANTED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 600.0, "cant": 0.1}]}
 WIDENED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 200.0, "widening": 0.01}]}
@@ -33,6 +34,8 @@ CASES = [
     ("contact.slip", {"contact.patch": "tabulated"}, "creepages", {"contact.patch": "maximum"}),
     ("contact.detection_tolerance", {"contact.detection": "auto"}, 1e-6, {"contact.detection": "planar"}),
     ("contact.normal.damping.v0", {"contact.normal.damping.c_e": 0.7}, 0.1, {"contact.normal.damping.c_e": 1.0}),
+    (f"{FALLING}.decay", {f"{FALLING}.ratio": 0.7}, 0.4, {f"{FALLING}.ratio": 1.0}),
+    (f"{FALLING}.ratio", {f"{FALLING}.decay": 0.4}, 0.7, {f"{FALLING}.decay": 0.0}),
     ("contact.creep.k_A", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "linear"}),
     ("contact.creep.k_S", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "table"}),
     ("contact.creep.planes", {"contact.creep.model": "table"}, "sdec", {"contact.creep.model": "she"}),
@@ -62,6 +65,7 @@ def scene_with(changes):
     data = copy.deepcopy(read_yaml(SCENE))
     data["vehicle"]["parameters"] = read_yaml(SCENES.parent / data["vehicle"]["parameters"])
     data["integration"].pop("rtol")
+    data["contact"]["friction"] = {"mu": 0.3}
     for key, value in ({"contact.patch": "moment"} | changes).items():
         set_at(data, key, value, "test")
     return data

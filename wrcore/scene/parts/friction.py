@@ -82,6 +82,8 @@ def _falling(spec, reader):
         raise reader.error("", "expected ratio and decay, or law, length and spacing")
     if "law" in spec:
         return _by_law(_over_slip, spec, 1, reader)
+    if spec in ({"ratio": 1.0}, {"decay": 0.0}):
+        return ()  # constant friction
     _check_keys(spec, ("ratio", "decay"), reader)
     return float(spec["ratio"]), float(spec["decay"])
 
