@@ -1,5 +1,6 @@
 # Checks of the configuration, and which sources each family of rules stands on.
 import re
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import yaml
@@ -14,7 +15,7 @@ HERE = Path(workflow.basedir)
 
 def refuse(key, expected):
     """Stop with one line that names a key of the configuration, and the file that gives it."""
-    places = re.split(" on | with ", key)
+    places = [key, *re.split(" on | with ", key)]
     changed = [
         path for path in map(Path, workflow.overwrite_configfiles)
         if any(has_key(yaml.safe_load(path.read_text()) or {}, place.split(".")) for place in places)
@@ -92,11 +93,86 @@ def check_config():
             scenes[place] = (scene, model["set"] | entry["track"])
             if "start" in model:
                 scenes[f"{place}.start"] = (scene, model["set"] | model["start"])
-    for key, (scene, changes) in scenes.items():
-        try:
-            load_scene(scene, changes)
-        except InputError as error:
-            refuse(key, f"{error}")
+    loaded = {key: checked(key, load_scene, scene, changes) for key, (scene, changes) in scenes.items()}
+    for key in ("plain.scene", "creep", "axle_boxes"):
+        check_tangent(f"cost.pairs.{key}", names_at(config["cost"]["pairs"], key), loaded)
+    check_tangent("cost.stages.scenes", config["cost"]["stages"]["scenes"], loaded)
+    for name, train in config["cost"]["growth"]["trains"].items():
+        check_tangent(f"cost.growth.trains.{name}.scene", [train["scene"]], loaded)
+    if not loaded["patch.cost"].track.tangent:
+        refuse("patch.cost.scene", "expected a scene on tangent, perfect track")
+    if not any(one.rails[1] for one in loaded["crossings.scene"].crossings):
+        refuse("crossings.scene", "expected a scene with track.crossing in the right rail")
+    check_numbers(config)
+    check_profiles()
+    check_wear_plans()
+
+
+def checked(key, function, *arguments):
+    """Call a function, and stop with one line that names a key of the configuration if it refuses its arguments."""
+    try:
+        return function(*arguments)
+    except InputError as error:
+        refuse(key, f"{error}")
+
+
+def check_tangent(key, names, scenes):
+    """Stop if one of the scenes under cost.scenes has a track that differs from place to place."""
+    for name in names:
+        if not scenes[f"cost.scenes.{name}"].track.tangent:
+            refuse(key, f"expected scenes on tangent, perfect track, got {name!r}")
+
+
+RISING = (
+    "speeds.values", "creep.levels", "critical_speed.vehicles.*.cycle_speeds", "hard_cases.families.contact.slow_push.durations",
+    "patch.zones.*", "ivp.baumgarte", "cost.growth.*.size.counts", "cost.growth.trains.*.size.counts",
+)  # fmt: skip
+"""Lists of numbers, each larger than the one before."""
+
+
+def check_numbers(data, key=""):
+    """Stop if equally spaced numbers or a list under `RISING` do not rise."""
+    if isinstance(data, dict) and data.keys() == {"start", "stop", "num"} and data["start"] >= data["stop"]:
+        refuse(f"{key}.stop", f"expected more than start, {data['start']:g}, got {data['stop']:g}")
+    if isinstance(data, list) and any(fnmatchcase(key, pattern) for pattern in RISING):
+        if any(one >= next for one, next in zip(data, data[1:])):
+            refuse(key, f"expected rising numbers, got {data}")
+    for name, inner in data.items() if isinstance(data, dict) else ():
+        check_numbers(inner, f"{key}.{name}".strip("."))
+
+
+def check_profiles():
+    """Stop if a pair of profiles cannot be read, or a profile of the hard cases lacks an argument of its kind."""
+    from study.contact.tables import study_pair
+    from study.hard_cases.profiles import SHAPES
+
+    hard = config["hard_cases"]["families"]
+    for place, pairs in (("contact.pairs", config["contact"]["pairs"]),
+                         ("hard_cases.families.contact.pose_sweeps.pairs", hard["contact"]["pose_sweeps"]["pairs"])):
+        for label, pair in pairs.items():
+            checked(f"{place}.{label}", study_pair, pair)
+    for name, entry in hard["profiles"]["profiles"]["entries"].items():
+        expected, given = SHAPES[entry["kind"]], set(entry.get("shape", {}))
+        if given != expected:
+            refuse(f"hard_cases.families.profiles.profiles.entries.{name}", f"expected the shape {sorted(expected)}, got {sorted(given)}")
+    patch = config["patch"]
+    if patch["shown"]["load"] not in patch["loads"]:
+        refuse("patch.shown.load", f"expected one of patch.loads, got {patch['shown']['load']:g}")
+
+
+def check_wear_plans():
+    """Stop if the wear plan, its settings or a variant of it cannot be used."""
+    from study.wear.influences import variant_changes
+    from wrcore.analysis.wear.evolve import load_wear_plan
+
+    wear, checked_changes = config["wear"], set()
+    asked = {"wear.settings": wear["settings"]}
+    for name, variant in wear["influences"]["variants"].items():
+        asked[f"wear.influences.variants.{name}"] = variant_changes(variant, wear["influences"]["distance"])
+    for key, changes in asked.items():
+        if repr(changes) not in checked_changes:
+            checked(f"wear.plan with {key}", load_wear_plan, wear["plan"], changes)
+        checked_changes.add(repr(changes))
 
 
 def chosen_names():
@@ -137,7 +213,8 @@ def names_at(data, key):
     return [data] if isinstance(data, str) else list(data)
 
 
-check_config()
+if workflow.is_main_process:  # jobs get a configuration that has been checked
+    check_config()
 
 CASES = list(config["paper"]["cases"])
 WITH_TWINS = [case for case in CASES if config["paper"]["cases"][case]["twins"]]

@@ -40,6 +40,10 @@ def kinked(wheel, height, place, half_width):
     return wheel.f - height * np.clip(1.0 - np.abs(wheel.u - place) / half_width, 0.0, None)
 
 
+SHAPES = {"worn": {"share", "reach"}, "kinked": {"height", "place", "half_width"}, "plain": set()}
+"""Arguments of the kinds of profiles."""
+
+
 def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.inf):
     """Return a `ProfileCurve` through equally spaced points of a wheel profile with given ordinates (n,) at its nodes.
 
