@@ -36,8 +36,7 @@ def exact_settings(wildcards):
 
 
 rule accuracy_exact:
-    message:
-        "{wildcards.measured}: exact contact at two resolutions"
+    message: "{wildcards.measured}: exact contact at two resolutions"
     input:
         core=CORE["simulation"] + CORE["accuracy"],
         scenes=SCENES,
@@ -45,14 +44,11 @@ rule accuracy_exact:
     output:
         run="<results>/accuracy/{measured}_exact.h5",
         table="<results>/accuracy/{measured}_exact.csv",
-    log:
-        "<logs>/accuracy_exact/{measured}.log",
-    benchmark:
-        "<benchmarks>/accuracy_exact/{measured}.tsv"
+    log: "<logs>/accuracy_exact/{measured}.log"
+    benchmark: "<benchmarks>/accuracy_exact/{measured}.tsv"
     params:
         settings=exact_settings,
-    script:
-        "../scripts/accuracy/accuracy_exact.py"
+    script: "../scripts/accuracy/accuracy_exact.py"
 
 
 def exact_run(wildcards):
@@ -62,25 +58,21 @@ def exact_run(wildcards):
 
 
 rule accuracy_tables:
-    message:
-        "Creep tables of all sizes that are compared"
+    message: "Creep tables of all sizes that are compared"
     input:
         core=CORE["creep"],
     output:
         touch("<results>/accuracy/tables.built"),
-    log:
-        "<logs>/accuracy_tables.log",
+    log: "<logs>/accuracy_tables.log"
     params:
         nu=config["creep"]["table"]["nu"],
         creeps=ACCURACY["grids"]["models"]["creep"],
     threads: workflow.cores
-    script:
-        "../scripts/accuracy/accuracy_tables.py"
+    script: "../scripts/accuracy/accuracy_tables.py"
 
 
 rule accuracy_study:
-    message:
-        "{wildcards.measured}: speed against error of every choice"
+    message: "{wildcards.measured}: speed against error of every choice"
     input:
         core=CORE["simulation"] + CORE["accuracy"],
         scenes=SCENES,
@@ -90,86 +82,55 @@ rule accuracy_study:
     output:
         choices="<results>/accuracy/{measured}.csv",
         reference="<results>/accuracy/{measured}_reference.csv",
-    log:
-        "<logs>/accuracy_study/{measured}.log",
-    benchmark:
-        "<benchmarks>/accuracy_study/{measured}.tsv"
+    log: "<logs>/accuracy_study/{measured}.log"
+    benchmark: "<benchmarks>/accuracy_study/{measured}.tsv"
     params:
         settings=measured_settings,
     # all cores: nothing else may run beside what is timed
     threads: workflow.cores
-    script:
-        "../scripts/accuracy/accuracy_study.py"
+    script: "../scripts/accuracy/accuracy_study.py"
 
 
 rule speed_against_error:
-    message:
-        "Figure and tables: speed against error"
+    message: "Figure and tables: speed against error"
     input:
         core=CORE["accuracy_figures"],
         choices=expand(rules.accuracy_study.output.choices, measured=ACCURACY_SCENES),
         references=expand(rules.accuracy_study.output.reference, measured=ACCURACY_SCENES),
         exacts=expand(rules.accuracy_exact.output.table, measured=WITH_EXACT),
     output:
-        report(
-            "<results>/accuracy/speed_against_error.png",
-            caption="../report/accuracy/speed_against_error.rst",
-            category="08 Speed against error",
-            labels={"figure": "speed against error"},
-        ),
+        shown("accuracy/speed_against_error.png", "speed against error"),
         "<results>/accuracy/speed_against_error.svg",
-        report(
-            "<results>/accuracy/choose_for_accuracy.csv",
-            caption="../report/accuracy/choose_for_accuracy.rst",
-            category="08 Speed against error",
-            labels={"table": "choose this for that accuracy"},
-        ),
+        shown("accuracy/choose_for_accuracy.csv", "choose this for that accuracy"),
         "<results>/accuracy/accuracy_front.csv",
-        report(
-            "<results>/accuracy/models.csv",
-            caption="../report/accuracy/models.rst",
-            category="08 Speed against error",
-            labels={"table": "errors of models"},
-        ),
-    log:
-        "<logs>/speed_against_error.log",
+        shown("accuracy/models.csv", "errors of models"),
+    log: "<logs>/speed_against_error.log"
     params:
         titles={name: entry["title"] for name, entry in ACCURACY["scenes"].items()},
         exact=WITH_EXACT,
         finest=ACCURACY["reference"]["creep"],
         accuracies=ACCURACY["accuracies"],
-    script:
-        "../scripts/accuracy/speed_against_error.py"
+    script: "../scripts/accuracy/speed_against_error.py"
 
 
 rule accuracy_requests:
-    message:
-        "Random scenes: is an accuracy that is asked for reached?"
+    message: "Random scenes: is an accuracy that is asked for reached?"
     input:
         core=CORE["simulation"] + CORE["accuracy_requests"],
         scenes=SCENES,
         table=rules.creep_table.output,
     output:
         rows="<results>/accuracy/requests.csv",
-        summary=report(
-            "<results>/accuracy/requests_summary.csv",
-            caption="../report/accuracy/requests.rst",
-            category="08 Speed against error",
-            labels={"table": "accuracies asked for and reached"},
-        ),
-    log:
-        "<logs>/accuracy_requests.log",
-    benchmark:
-        "<benchmarks>/accuracy_requests.tsv"
+        summary=shown("accuracy/requests_summary.csv", "accuracies asked for and reached"),
+    log: "<logs>/accuracy_requests.log"
+    benchmark: "<benchmarks>/accuracy_requests.tsv"
     params:
         settings=ACCURACY["requests"],
-    script:
-        "../scripts/accuracy/accuracy_requests.py"
+    script: "../scripts/accuracy/accuracy_requests.py"
 
 
 rule claims:
-    message:
-        "What reports/accuracy.md promises: medians and worst cases"
+    message: "What reports/accuracy.md promises: medians and worst cases"
     input:
         core=CORE["accuracy_figures"],
         contact=rules.contact_reductions.output.cases,
@@ -179,7 +140,5 @@ rule claims:
     output:
         table="<results>/accuracy/claims.csv",
         text="<results>/accuracy/claims.md",
-    log:
-        "<logs>/claims.log",
-    script:
-        "../scripts/accuracy/claims.py"
+    log: "<logs>/claims.log"
+    script: "../scripts/accuracy/claims.py"

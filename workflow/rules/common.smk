@@ -216,6 +216,40 @@ def names_at(data, key):
 if workflow.is_main_process:  # jobs get a configuration that has been checked
     check_config()
 
+PAGES = {
+    "comparison": "01 The paper's values and ours",
+    "paper": "02 The paper's figures",
+    "contact": "03 Contact geometry",
+    "patch": "04 The real patch",
+    "creep": "05 Creep forces",
+    "speeds": "06 Wheelset and trailer vehicle",
+    "critical_speed": "07 Hunting: critical speeds",
+    "accuracy": "08 Speed against error",
+    "cost": "09 Cost",
+    "hard_cases": "10 Hard cases",
+    "ivp": "11 Benchmark of integrators",
+    "sweeps": "12 Sweeps",
+    "wear": "13 Wear",
+    "crossings": "14 Crossings",
+}
+"""Pages of the report by question; the table of comparison has a page of its own."""
+
+
+def shown(name, title, page=None, caption=None, **labels):
+    """Mark a file below ``<results>`` for the report: a figure or table with its title and the labels of its wildcards.
+
+    Its caption has the file's name without wildcards, and its page is that of its question, unless both are given.
+    """
+    question, file = name.split("/")
+    stem = re.sub(r"_?{\w+}", "", Path(file).stem)
+    return report(
+        f"<results>/{name}",
+        caption=f"../report/{question}/{caption or stem}.rst",
+        category=PAGES[page or question],
+        labels={"figure" if file.endswith(".png") else "table": title, **labels},
+    )
+
+
 CASES = list(config["paper"]["cases"])
 WITH_TWINS = [case for case in CASES if config["paper"]["cases"][case]["twins"]]
 

@@ -7,138 +7,75 @@ CONTACT_PAIR_FIGURES = ["location", "radius_difference", "angle", "conicity", "l
 
 
 rule contact_pairs:
-    message:
-        "Contact geometry of the pairs"
+    message: "Contact geometry of the pairs"
     input:
         core=CORE["contact_figures"],
     output:
         touch="<results>/contact/touch.csv",
         conicity="<results>/contact/conicity.csv",
         yaw="<results>/contact/location_with_yaw.csv",
-        location=report(
-            "<results>/contact/contact_location.png",
-            caption="../report/contact/contact_location.rst",
-            category="03 Contact geometry",
-            labels={"figure": "contact points"},
-        ),
-        radius=report(
-            "<results>/contact/contact_radius_difference.png",
-            caption="../report/contact/contact_radius_difference.rst",
-            category="03 Contact geometry",
-            labels={"figure": "rolling radius difference"},
-        ),
-        angle=report(
-            "<results>/contact/contact_angle.png",
-            caption="../report/contact/contact_angle.rst",
-            category="03 Contact geometry",
-            labels={"figure": "contact angle"},
-        ),
-        conicity_figure=report(
-            "<results>/contact/contact_conicity.png",
-            caption="../report/contact/contact_conicity.rst",
-            category="03 Contact geometry",
-            labels={"figure": "equivalent conicity"},
-        ),
-        yaw_figure=report(
-            "<results>/contact/contact_location_with_yaw.png",
-            caption="../report/contact/contact_location_with_yaw.rst",
-            category="03 Contact geometry",
-            labels={"figure": "contact points with yaw"},
-        ),
+        location=shown("contact/contact_location.png", "contact points"),
+        radius=shown("contact/contact_radius_difference.png", "rolling radius difference"),
+        angle=shown("contact/contact_angle.png", "contact angle"),
+        conicity_figure=shown("contact/contact_conicity.png", "equivalent conicity"),
+        yaw_figure=shown("contact/contact_location_with_yaw.png", "contact points with yaw"),
         svg=expand("<results>/contact/contact_{name}.svg", name=CONTACT_PAIR_FIGURES),
-    log:
-        "<logs>/contact_pairs.log",
+    log: "<logs>/contact_pairs.log"
     params:
         pairs=CONTACT["pairs"],
         shifts=CONTACT["shifts"],
         yaws=CONTACT["yaws"],
         amplitudes=CONTACT["amplitudes"],
-    script:
-        "../scripts/contact/contact_pairs.py"
+    script: "../scripts/contact/contact_pairs.py"
 
 
 rule contact_planar_error:
-    message:
-        "Error of planar detection over yaw and contact angle"
+    message: "Error of planar detection over yaw and contact angle"
     input:
         core=CORE["contact_figures"],
     output:
         table="<results>/contact/planar_error.csv",
-        figure=report(
-            "<results>/contact/contact_planar_error.png",
-            caption="../report/contact/contact_planar_error.rst",
-            category="03 Contact geometry",
-            labels={"figure": "planar against spatial"},
-        ),
+        figure=shown("contact/contact_planar_error.png", "planar against spatial"),
         svg="<results>/contact/contact_planar_error.svg",
-    log:
-        "<logs>/contact_planar_error.log",
+    log: "<logs>/contact_planar_error.log"
     params:
         pair=CONTACT_PAIR,
         settings=CONTACT["planar_error"],
-    script:
-        "../scripts/contact/contact_planar_error.py"
+    script: "../scripts/contact/contact_planar_error.py"
 
 
 rule contact_reductions:
-    message:
-        "Reductions: continuity, coexisting patches, agreement with CONTACT"
+    message: "Reductions: continuity, coexisting patches, agreement with CONTACT"
     input:
         core=CORE["contact_figures"],
         reference=CONTACT["reductions"]["reference"],
     output:
         cases="<results>/contact/reductions_cases.csv",
-        summary=report(
-            "<results>/contact/reductions.csv",
-            caption="../report/contact/contact_reductions.rst",
-            category="03 Contact geometry",
-            labels={"table": "reductions against CONTACT"},
-        ),
+        summary=shown("contact/reductions.csv", "reductions against CONTACT"),
         jumps="<results>/contact/force_steps.csv",
         patches="<results>/contact/patch_forces.csv",
-        sweep_figure=report(
-            "<results>/contact/contact_force_sweep.png",
-            caption="../report/contact/contact_force_sweep.rst",
-            category="03 Contact geometry",
-            labels={"figure": "force in a lateral sweep"},
-        ),
-        patch_figure=report(
-            "<results>/contact/contact_patch_forces.png",
-            caption="../report/contact/contact_patch_forces.rst",
-            category="03 Contact geometry",
-            labels={"figure": "two patches"},
-        ),
+        sweep_figure=shown("contact/contact_force_sweep.png", "force in a lateral sweep"),
+        patch_figure=shown("contact/contact_patch_forces.png", "two patches"),
         svg=expand("<results>/contact/contact_{name}.svg", name=["force_sweep", "patch_forces"]),
-    log:
-        "<logs>/contact_reductions.log",
+    log: "<logs>/contact_reductions.log"
     params:
         pair=CONTACT_PAIR,
         settings=CONTACT["reductions"],
-    script:
-        "../scripts/contact/contact_reductions.py"
+    script: "../scripts/contact/contact_reductions.py"
 
 
 rule contact_search:
-    message:
-        "Contact search against a dense one at random poses"
+    message: "Contact search against a dense one at random poses"
     input:
         core=CORE["contact_search"],
     output:
-        report(
-            "<results>/contact/search.csv",
-            caption="../report/contact/contact_search.rst",
-            category="03 Contact geometry",
-            labels={"table": "search against dense search"},
-        ),
-    log:
-        "<logs>/contact_search.log",
-    benchmark:
-        "<benchmarks>/contact_search.tsv"
+        shown("contact/search.csv", "search against dense search"),
+    log: "<logs>/contact_search.log"
+    benchmark: "<benchmarks>/contact_search.tsv"
     params:
         pair=CONTACT_PAIR,
         settings=CONTACT["search"],
-    script:
-        "../scripts/contact/contact_search.py"
+    script: "../scripts/contact/contact_search.py"
 
 
 rule contact_study:

@@ -26,8 +26,7 @@ def cycle_speeds(wildcards):
 
 
 rule root_locus:
-    message:
-        "{wildcards.vehicle}: modes over speed, linear critical speeds"
+    message: "{wildcards.vehicle}: modes over speed, linear critical speeds"
     input:
         core=CORE["critical_speed"],
         scenes=SCENES,
@@ -38,23 +37,19 @@ rule root_locus:
         linear="<results>/critical_speed/{vehicle}_linear.csv",
         shown="<results>/critical_speed/{vehicle}_energies.csv",
         shapes="<results>/critical_speed/{vehicle}_shapes.csv",
-    log:
-        "<logs>/root_locus/{vehicle}.log",
-    benchmark:
-        "<benchmarks>/root_locus/{vehicle}.tsv"
+    log: "<logs>/root_locus/{vehicle}.log"
+    benchmark: "<benchmarks>/root_locus/{vehicle}.tsv"
     params:
         overrides=critical_set,
         speeds=CRITICAL["speeds"],
         search=CRITICAL["search"],
         shown=CRITICAL["shown"],
         variants={name: changes(entry) for name, entry in CRITICAL["variants"].items()},
-    script:
-        "../scripts/critical_speed/root_locus.py"
+    script: "../scripts/critical_speed/root_locus.py"
 
 
 rule limit_cycles:
-    message:
-        "{wildcards.vehicle}, {wildcards.detection}: limit cycles over speed"
+    message: "{wildcards.vehicle}, {wildcards.detection}: limit cycles over speed"
     input:
         core=CORE["critical_speed"],
         scenes=SCENES,
@@ -62,81 +57,47 @@ rule limit_cycles:
         table=rules.creep_table.output,
     output:
         "<results>/critical_speed/{vehicle}_{detection}_limit_cycles.csv",
-    log:
-        "<logs>/limit_cycles/{vehicle}_{detection}.log",
-    benchmark:
-        "<benchmarks>/limit_cycles/{vehicle}_{detection}.tsv"
+    log: "<logs>/limit_cycles/{vehicle}_{detection}.log"
+    benchmark: "<benchmarks>/limit_cycles/{vehicle}_{detection}.tsv"
     params:
         overrides=critical_set,
         speeds=cycle_speeds,
         settings=CRITICAL["limit_cycles"],
-    script:
-        "../scripts/critical_speed/limit_cycles.py"
+    script: "../scripts/critical_speed/limit_cycles.py"
 
 
 rule critical_speeds:
-    message:
-        "Critical speeds: root locus, limit cycles, table"
+    message: "Critical speeds: root locus, limit cycles, table"
     input:
         core=CORE["critical_speed_figures"],
         loci=expand(rules.root_locus.output.locus, vehicle=HUNTING),
         linear=expand(rules.root_locus.output.linear, vehicle=HUNTING),
         cycles=expand(rules.limit_cycles.output, vehicle=HUNTING, detection=["planar", "spatial"]),
     output:
-        table=report(
-            "<results>/critical_speed/critical_speeds.csv",
-            caption="../report/critical_speed/critical_speeds.rst",
-            category="07 Hunting: critical speeds",
-            labels={"table": "critical speeds"},
-        ),
-        variants=report(
-            "<results>/critical_speed/critical_speed_variants.csv",
-            caption="../report/critical_speed/critical_speed_variants.rst",
-            category="07 Hunting: critical speeds",
-            labels={"table": "what the critical speed depends on"},
-        ),
-        locus=report(
-            "<results>/critical_speed/root_locus.png",
-            caption="../report/critical_speed/root_locus.rst",
-            category="07 Hunting: critical speeds",
-            labels={"figure": "root locus"},
-        ),
-        cycles=report(
-            "<results>/critical_speed/limit_cycles.png",
-            caption="../report/critical_speed/limit_cycles.rst",
-            category="07 Hunting: critical speeds",
-            labels={"figure": "limit cycles"},
-        ),
+        table=shown("critical_speed/critical_speeds.csv", "critical speeds"),
+        variants=shown("critical_speed/critical_speed_variants.csv", "what the critical speed depends on"),
+        locus=shown("critical_speed/root_locus.png", "root locus"),
+        cycles=shown("critical_speed/limit_cycles.png", "limit cycles"),
         svg=expand("<results>/critical_speed/{name}.svg", name=["root_locus", "limit_cycles"]),
-    log:
-        "<logs>/critical_speeds.log",
+    log: "<logs>/critical_speeds.log"
     params:
         titles={name: entry["title"] for name, entry in CRITICAL["vehicles"].items()},
         disturbance=CRITICAL["limit_cycles"]["settling"]["disturbance"],
-    script:
-        "../scripts/critical_speed/critical_speeds.py"
+    script: "../scripts/critical_speed/critical_speeds.py"
 
 
 rule fig_modes:
-    message:
-        "Modes of the {wildcards.vehicle}"
+    message: "Modes of the {wildcards.vehicle}"
     input:
         core=CORE["critical_speed_figures"],
         modes=rules.root_locus.output.shown,
     output:
-        report(
-            "<results>/critical_speed/modes_{vehicle}.png",
-            caption="../report/critical_speed/modes.rst",
-            category="07 Hunting: critical speeds",
-            labels={"figure": "modes", "vehicle": "{vehicle}"},
-        ),
+        shown("critical_speed/modes_{vehicle}.png", "modes", vehicle="{vehicle}"),
         "<results>/critical_speed/modes_{vehicle}.svg",
-    log:
-        "<logs>/fig_modes/{vehicle}.log",
+    log: "<logs>/fig_modes/{vehicle}.log"
     params:
         speed=CRITICAL["shown"],
-    script:
-        "../scripts/critical_speed/fig_modes.py"
+    script: "../scripts/critical_speed/fig_modes.py"
 
 
 rule critical_speed_study:

@@ -5,43 +5,24 @@ CORE["crossings"] = sources(*LOADED, *SCENE, "analysis/contact/on_slices", *STYL
 
 
 rule crossing_nose:
-    message:
-        "A wheel over the nose of a crossing"
+    message: "A wheel over the nose of a crossing"
     input:
         core=CORE["crossings"],
         scenes=SCENES,
         scene=CROSSINGS["scene"],
     output:
-        table=report(
-            "<results>/crossings/nose.csv",
-            caption="../report/crossings/nose.rst",
-            category="14 Crossings",
-            labels={"table": "a wheel over the nose"},
-        ),
-        summary=report(
-            "<results>/crossings/models.csv",
-            caption="../report/crossings/models.rst",
-            category="14 Crossings",
-            labels={"table": "patch models on the nose"},
-        ),
-        figure=report(
-            "<results>/crossings/nose.png",
-            caption="../report/crossings/nose.rst",
-            category="14 Crossings",
-            labels={"figure": "a wheel over the nose"},
-        ),
+        table=shown("crossings/nose.csv", "a wheel over the nose"),
+        summary=shown("crossings/models.csv", "patch models on the nose"),
+        figure=shown("crossings/nose.png", "a wheel over the nose"),
         svg="<results>/crossings/nose.svg",
-    log:
-        "<logs>/crossing_nose.log",
-    benchmark:
-        "<benchmarks>/crossing_nose.tsv"
+    log: "<logs>/crossing_nose.log"
+    benchmark: "<benchmarks>/crossing_nose.tsv"
     params:
         models=CROSSINGS["models"],
         places=CROSSINGS["places"],
         load=CROSSINGS["load"],
         yaw=CROSSINGS["yaw"],
-    script:
-        "../scripts/crossings/nose.py"
+    script: "../scripts/crossings/nose.py"
 
 
 rule crossings_study:

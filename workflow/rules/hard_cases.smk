@@ -15,8 +15,7 @@ def hard_settings(wildcards):
 
 
 rule hard_cases:
-    message:
-        "Hard cases: {wildcards.family}"
+    message: "Hard cases: {wildcards.family}"
     input:
         core=CORE["hard_cases"],
         scenes=SCENES,
@@ -24,70 +23,38 @@ rule hard_cases:
     output:
         table="<results>/hard_cases/{family}.csv",
         curves="<results>/hard_cases/{family}_curves.json",
-    log:
-        "<logs>/hard_cases/{family}.log",
-    benchmark:
-        "<benchmarks>/hard_cases/{family}.tsv"
+    log: "<logs>/hard_cases/{family}.log"
+    benchmark: "<benchmarks>/hard_cases/{family}.tsv"
     params:
         vehicles=HARD["vehicles"],
         settings=hard_settings,
-    script:
-        "../scripts/hard_cases/hard_cases.py"
+    script: "../scripts/hard_cases/hard_cases.py"
 
 
 rule hard_cases_table:
-    message:
-        "Hard cases: one table, and its summary"
+    message: "Hard cases: one table, and its summary"
     input:
         core=CORE["hard_cases"],
         tables=expand(rules.hard_cases.output.table, family=FAMILIES),
     output:
-        table=report(
-            "<results>/hard_cases/all.csv",
-            caption="../report/hard_cases/stability_table.rst",
-            category="10 Hard cases",
-            labels={"table": "every check"},
-        ),
-        summary=report(
-            "<results>/hard_cases/summary.csv",
-            caption="../report/hard_cases/stability_summary.rst",
-            category="10 Hard cases",
-            labels={"table": "cases"},
-        ),
-        limits=report(
-            "<results>/hard_cases/limits.csv",
-            caption="../report/hard_cases/stability_limits.rst",
-            category="10 Hard cases",
-            labels={"table": "known limits"},
-        ),
+        table=shown("hard_cases/all.csv", "every check"),
+        summary=shown("hard_cases/summary.csv", "cases"),
+        limits=shown("hard_cases/limits.csv", "known limits"),
         text="<results>/hard_cases/all.md",
-    log:
-        "<logs>/hard_cases_table.log",
-    script:
-        "../scripts/hard_cases/hard_cases_table.py"
+    log: "<logs>/hard_cases_table.log"
+    script: "../scripts/hard_cases/hard_cases_table.py"
 
 
 rule fig_hard_cases:
-    message:
-        "Hard cases: figures"
+    message: "Hard cases: figures"
     input:
         core=CORE["hard_cases"] + sources(*STYLE),
         curves=expand(rules.hard_cases.output.curves, family=FAMILIES),
     output:
-        **{
-            name: report(
-                f"<results>/hard_cases/hard_cases_{name}.png",
-                caption=f"../report/hard_cases/hard_cases_{name}.rst",
-                category="10 Hard cases",
-                labels={"figure": name.replace("_", " ")},
-            )
-            for name in HARD_FIGURES
-        },
+        **{name: shown(f"hard_cases/hard_cases_{name}.png", name.replace("_", " ")) for name in HARD_FIGURES},
         svg=expand("<results>/hard_cases/hard_cases_{name}.svg", name=HARD_FIGURES),
-    log:
-        "<logs>/fig_hard_cases.log",
-    script:
-        "../scripts/hard_cases/fig_hard_cases.py"
+    log: "<logs>/fig_hard_cases.log"
+    script: "../scripts/hard_cases/fig_hard_cases.py"
 
 
 rule hard_cases_study:

@@ -2,25 +2,21 @@
 
 
 rule contact_geometry:
-    message:
-        "Contact geometry without load"
+    message: "Contact geometry without load"
     input:
         core=CORE["geometry"],
         scenes=SCENES,
         scene=config["paper"]["geometry"]["scene"],
     output:
         "<results>/paper/contact_geometry.csv",
-    log:
-        "<logs>/contact_geometry.log",
+    log: "<logs>/contact_geometry.log"
     params:
         y=config["paper"]["geometry"]["y"],
-    script:
-        "../scripts/paper/contact_geometry.py"
+    script: "../scripts/paper/contact_geometry.py"
 
 
 rule simulate:
-    message:
-        "{wildcards.case}: planar and spatial run"
+    message: "{wildcards.case}: planar and spatial run"
     input:
         core=CORE["simulation"],
         scenes=SCENES,
@@ -29,19 +25,15 @@ rule simulate:
     output:
         planar="<results>/paper/runs/{case}/planar.h5",
         spatial="<results>/paper/runs/{case}/spatial.h5",
-    log:
-        "<logs>/simulate/{case}.log",
-    benchmark:
-        "<benchmarks>/simulate/{case}.tsv"
+    log: "<logs>/simulate/{case}.log"
+    benchmark: "<benchmarks>/simulate/{case}.tsv"
     params:
         overrides=case_overrides,
-    script:
-        "../scripts/paper/simulate.py"
+    script: "../scripts/paper/simulate.py"
 
 
 rule simulate_twins:
-    message:
-        "{wildcards.case}: tighter and mirrored twin of the spatial run"
+    message: "{wildcards.case}: tighter and mirrored twin of the spatial run"
     input:
         core=CORE["simulation"],
         scenes=SCENES,
@@ -50,30 +42,24 @@ rule simulate_twins:
     output:
         tight="<results>/paper/runs/{case}/spatial_tight.h5",
         mirrored="<results>/paper/runs/{case}/spatial_mirrored.h5",
-    log:
-        "<logs>/simulate_twins/{case}.log",
-    benchmark:
-        "<benchmarks>/simulate_twins/{case}.tsv"
+    log: "<logs>/simulate_twins/{case}.log"
+    benchmark: "<benchmarks>/simulate_twins/{case}.tsv"
     params:
         overrides=case_overrides,
         twins=config["paper"]["twins"],
-    script:
-        "../scripts/paper/simulate_twins.py"
+    script: "../scripts/paper/simulate_twins.py"
 
 
 rule time_runs:
-    message:
-        "Timing: planar and spatial runs in turn, nothing beside them"
+    message: "Timing: planar and spatial runs in turn, nothing beside them"
     input:
         core=CORE["simulation"] + CORE["paper"],
         scenes=SCENES,
         table=rules.creep_table.output,
     output:
         "<results>/paper/timing_samples.csv",
-    log:
-        "<logs>/time_runs.log",
-    benchmark:
-        "<benchmarks>/time_runs.tsv"
+    log: "<logs>/time_runs.log"
+    benchmark: "<benchmarks>/time_runs.tsv"
     params:
         cases={case: [config["paper"]["cases"][case]["scene"], overrides(case)] for case in config["paper"]["timing"]["cases"]},
         repetitions=config["paper"]["timing"]["repetitions"],
@@ -81,103 +67,69 @@ rule time_runs:
         first=config["paper"]["timing"]["first"],
     # all cores: nothing else may run beside it
     threads: workflow.cores
-    script:
-        "../scripts/paper/time_runs.py"
+    script: "../scripts/paper/time_runs.py"
 
 
 rule fig1_parametrisation:
-    message:
-        "Fig. 1: surfaces and coordinates"
+    message: "Fig. 1: surfaces and coordinates"
     input:
         core=CORE["figures"],
         scenes=SCENES,
         scene=config["paper"]["geometry"]["scene"],
     output:
-        report(
-            "<results>/paper/fig1_parametrisation.png",
-            caption="../report/paper/fig1.rst",
-            category="02 The paper's figures",
-            labels={"figure": "1"},
-        ),
+        shown("paper/fig1_parametrisation.png", "1"),
         "<results>/paper/fig1_parametrisation.svg",
-    log:
-        "<logs>/fig1_parametrisation.log",
-    script:
-        "../scripts/paper/fig1_parametrisation.py"
+    log: "<logs>/fig1_parametrisation.log"
+    script: "../scripts/paper/fig1_parametrisation.py"
 
 
 rule fig2_profiles:
-    message:
-        "Fig. 2: points on the profiles"
+    message: "Fig. 2: points on the profiles"
     input:
         core=CORE["figures"],
         scenes=SCENES,
         scene=config["paper"]["geometry"]["scene"],
     output:
-        report(
-            "<results>/paper/fig2_profiles.png",
-            caption="../report/paper/fig2.rst",
-            category="02 The paper's figures",
-            labels={"figure": "2"},
-        ),
+        shown("paper/fig2_profiles.png", "2"),
         "<results>/paper/fig2_profiles.svg",
-    log:
-        "<logs>/fig2_profiles.log",
-    script:
-        "../scripts/paper/fig2_profiles.py"
+    log: "<logs>/fig2_profiles.log"
+    script: "../scripts/paper/fig2_profiles.py"
 
 
 rule fig3_detection:
-    message:
-        "Fig. 3: planar and spatial detection"
+    message: "Fig. 3: planar and spatial detection"
     input:
         core=CORE["figures"],
         scenes=SCENES,
         scene=config["paper"]["geometry"]["scene"],
     output:
-        report(
-            "<results>/paper/fig3_detection.png",
-            caption="../report/paper/fig3.rst",
-            category="02 The paper's figures",
-            labels={"figure": "3"},
-        ),
+        shown("paper/fig3_detection.png", "3"),
         "<results>/paper/fig3_detection.svg",
-    log:
-        "<logs>/fig3_detection.log",
+    log: "<logs>/fig3_detection.log"
     params:
         pose=config["paper"]["figures"]["detection_pose"],
-    script:
-        "../scripts/paper/fig3_detection.py"
+    script: "../scripts/paper/fig3_detection.py"
 
 
 rule fig4_lateral_position:
-    message:
-        "Fig. 4: lateral position"
+    message: "Fig. 4: lateral position"
     input:
         core=CORE["figures"],
         planar=expand(rules.simulate.output.planar, case=CASES),
         spatial=expand(rules.simulate.output.spatial, case=CASES),
         tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
     output:
-        report(
-            "<results>/paper/fig4_lateral_position.png",
-            caption="../report/paper/fig4.rst",
-            category="02 The paper's figures",
-            labels={"figure": "4"},
-        ),
+        shown("paper/fig4_lateral_position.png", "4"),
         "<results>/paper/fig4_lateral_position.svg",
-    log:
-        "<logs>/fig4_lateral_position.log",
+    log: "<logs>/fig4_lateral_position.log"
     params:
         titles={case: config["paper"]["cases"][case]["title"] for case in CASES},
         bound=config["paper"]["twins"]["bound"],
-    script:
-        "../scripts/paper/fig4_lateral_position.py"
+    script: "../scripts/paper/fig4_lateral_position.py"
 
 
 rule fig5_contact_points:
-    message:
-        "Fig. 5: contact points"
+    message: "Fig. 5: contact points"
     input:
         core=CORE["figures"],
         scenes=SCENES,
@@ -186,24 +138,16 @@ rule fig5_contact_points:
         spatial=expand(rules.simulate.output.spatial, case=config["paper"]["figures"]["contact_points"]),
         tight=expand(rules.simulate_twins.output.tight, case=set(WITH_TWINS) & {config["paper"]["figures"]["contact_points"]}),
     output:
-        report(
-            "<results>/paper/fig5_contact_points.png",
-            caption="../report/paper/fig5.rst",
-            category="02 The paper's figures",
-            labels={"figure": "5"},
-        ),
+        shown("paper/fig5_contact_points.png", "5"),
         "<results>/paper/fig5_contact_points.svg",
-    log:
-        "<logs>/fig5_contact_points.log",
+    log: "<logs>/fig5_contact_points.log"
     params:
         bound=config["paper"]["twins"]["bound"],
-    script:
-        "../scripts/paper/fig5_contact_points.py"
+    script: "../scripts/paper/fig5_contact_points.py"
 
 
 rule motion_table:
-    message:
-        "Table: motion"
+    message: "Table: motion"
     input:
         core=CORE["paper"],
         planar=expand(rules.simulate.output.planar, case=CASES),
@@ -211,42 +155,26 @@ rule motion_table:
         tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
         mirrored=expand(rules.simulate_twins.output.mirrored, case=WITH_TWINS),
     output:
-        report(
-            "<results>/paper/motion.csv",
-            caption="../report/paper/motion.rst",
-            category="02 The paper's figures",
-            labels={"table": "motion"},
-        ),
-    log:
-        "<logs>/motion_table.log",
+        shown("paper/motion.csv", "motion"),
+    log: "<logs>/motion_table.log"
     params:
         bound=config["paper"]["twins"]["bound"],
-    script:
-        "../scripts/paper/motion_table.py"
+    script: "../scripts/paper/motion_table.py"
 
 
 rule timing_table:
-    message:
-        "Table: timing"
+    message: "Table: timing"
     input:
         core=CORE["paper"],
         samples=rules.time_runs.output,
     output:
-        report(
-            "<results>/paper/timing.csv",
-            caption="../report/paper/timing.rst",
-            category="09 Cost",
-            labels={"table": "timing"},
-        ),
-    log:
-        "<logs>/timing_table.log",
-    script:
-        "../scripts/paper/timing_table.py"
+        shown("paper/timing.csv", "timing", page="cost"),
+    log: "<logs>/timing_table.log"
+    script: "../scripts/paper/timing_table.py"
 
 
 rule comparison_table:
-    message:
-        "Table: published values beside ours"
+    message: "Table: published values beside ours"
     input:
         core=CORE["paper"],
         reference="reports/reference_values.csv",
@@ -254,16 +182,9 @@ rule comparison_table:
         motion=rules.motion_table.output,
         timing=rules.timing_table.output,
     output:
-        report(
-            "<results>/paper/comparison.csv",
-            caption="../report/paper/comparison.rst",
-            category="01 The paper's values and ours",
-            labels={"table": "comparison"},
-        ),
+        shown("paper/comparison.csv", "comparison", page="comparison"),
         "<results>/paper/comparison.md",
-    log:
-        "<logs>/comparison_table.log",
+    log: "<logs>/comparison_table.log"
     params:
         case=config["paper"]["comparison"]["case"],
-    script:
-        "../scripts/paper/comparison_table.py"
+    script: "../scripts/paper/comparison_table.py"

@@ -11,20 +11,16 @@ wildcard_constraints:
 
 
 rule notebook:
-    message:
-        "Notebook: {wildcards.notebook}"
+    message: "Notebook: {wildcards.notebook}"
     input:
         core=CORE["notebooks"],
         scenes=SCENES,
         notebook="notebooks/{notebook}.ipynb",
     output:
         "<results>/notebooks/{notebook}.ipynb",
-    log:
-        "<logs>/notebooks/{notebook}.log",
-    benchmark:
-        "<benchmarks>/notebooks/{notebook}.tsv"
-    script:
-        "../scripts/report/notebook.py"
+    log: "<logs>/notebooks/{notebook}.log"
+    benchmark: "<benchmarks>/notebooks/{notebook}.tsv"
+    script: "../scripts/report/notebook.py"
 
 
 rule notebooks:
@@ -77,34 +73,28 @@ def report_items(wildcards):
 
 
 rule report_pages:
-    message:
-        "Report as pages: {output}"
+    message: "Report as pages: {output}"
     input:
         rules.study.input,
         core=sources("study/report"),
         captions=sorted(str(p.relative_to(HERE)) for p in (HERE / "workflow/report").rglob("*.rst")),
     output:
         "<results>/report/index.html",
-    log:
-        "<logs>/report_pages.log",
+    log: "<logs>/report_pages.log"
     params:
         marked=report_items,
         config=config,
-    script:
-        "../scripts/report/report_pages.py"
+    script: "../scripts/report/report_pages.py"
 
 
 rule report_archive:
-    message:
-        "Report: {output}"
+    message: "Report: {output}"
     input:
         rules.study.input,
         captions=sorted(str(p.relative_to(HERE)) for p in (HERE / "workflow/report").rglob("*.rst")),
     output:
         "<results>/report.zip",
-    log:
-        "<logs>/report_archive.log",
+    log: "<logs>/report_archive.log"
     params:
         config=config,
-    script:
-        "../scripts/report/report_archive.py"
+    script: "../scripts/report/report_archive.py"

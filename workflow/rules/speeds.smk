@@ -29,8 +29,7 @@ def vehicle_overrides(wildcards):
 
 
 rule sweep_speeds:
-    message:
-        "{wildcards.vehicle}: all speeds, all tracks, planar and spatial"
+    message: "{wildcards.vehicle}: all speeds, all tracks, planar and spatial"
     input:
         core=CORE["simulation"] + CORE["vehicle"],
         scenes=SCENES,
@@ -41,22 +40,18 @@ rule sweep_speeds:
         shown=[
             f"<results>/speeds/{{vehicle}}/{track}_{detection}_v{speed:g}.h5" for track, detection, speed in SHOWN
         ],
-    log:
-        "<logs>/sweep_speeds/{vehicle}.log",
-    benchmark:
-        "<benchmarks>/sweep_speeds/{vehicle}.tsv"
+    log: "<logs>/sweep_speeds/{vehicle}.log"
+    benchmark: "<benchmarks>/sweep_speeds/{vehicle}.tsv"
     params:
         overrides=vehicle_overrides,
         speeds=SPEEDS["values"],
         tracks={track: changes(entry) for track, entry in SPEEDS["tracks"].items()},
         shown=SHOWN,
-    script:
-        "../scripts/speeds/sweep_speeds.py"
+    script: "../scripts/speeds/sweep_speeds.py"
 
 
 rule vehicle_lateral_motion:
-    message:
-        "Figure: lateral motion of all wheelsets of the {wildcards.vehicle}"
+    message: "Figure: lateral motion of all wheelsets of the {wildcards.vehicle}"
     input:
         core=CORE["vehicle_figures"],
         runs=[
@@ -65,105 +60,59 @@ rule vehicle_lateral_motion:
             for detection in ("planar", "spatial")
         ],
     output:
-        report(
-            "<results>/speeds/vehicle_lateral_motion_{vehicle}.png",
-            caption="../report/speeds/vehicle_lateral_motion.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"figure": "lateral motion", "vehicle": "{vehicle}"},
-        ),
+        shown("speeds/vehicle_lateral_motion_{vehicle}.png", "lateral motion", vehicle="{vehicle}"),
         "<results>/speeds/vehicle_lateral_motion_{vehicle}.svg",
-    log:
-        "<logs>/vehicle_lateral_motion/{vehicle}.log",
+    log: "<logs>/vehicle_lateral_motion/{vehicle}.log"
     params:
         speeds=SPEEDS["shown"],
-    script:
-        "../scripts/speeds/vehicle_lateral_motion.py"
+    script: "../scripts/speeds/vehicle_lateral_motion.py"
 
 
 rule vehicle_guiding_forces:
-    message:
-        "Figure and table: forces of each wheel of the {wildcards.vehicle} on irregular track"
+    message: "Figure and table: forces of each wheel of the {wildcards.vehicle} on irregular track"
     input:
         core=CORE["vehicle_figures"],
         run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
         linear=vehicle_linear,
     output:
-        report(
-            "<results>/speeds/vehicle_guiding_forces_{vehicle}.png",
-            caption="../report/speeds/vehicle_guiding_forces.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"figure": "guiding forces", "vehicle": "{vehicle}"},
-        ),
+        shown("speeds/vehicle_guiding_forces_{vehicle}.png", "guiding forces", vehicle="{vehicle}"),
         "<results>/speeds/vehicle_guiding_forces_{vehicle}.svg",
-        report(
-            "<results>/speeds/vehicle_wheels_{vehicle}.csv",
-            caption="../report/speeds/vehicle_wheels.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"table": "wheels", "vehicle": "{vehicle}"},
-        ),
-    log:
-        "<logs>/vehicle_guiding_forces/{vehicle}.log",
-    script:
-        "../scripts/speeds/vehicle_guiding_forces.py"
+        shown("speeds/vehicle_wheels_{vehicle}.csv", "wheels", vehicle="{vehicle}"),
+    log: "<logs>/vehicle_guiding_forces/{vehicle}.log"
+    script: "../scripts/speeds/vehicle_guiding_forces.py"
 
 
 rule vehicle_over_speed:
-    message:
-        "Figures and tables: vehicles over speed"
+    message: "Figures and tables: vehicles over speed"
     input:
         core=CORE["vehicle_figures"],
         speeds=expand(rules.sweep_speeds.output.speeds, vehicle=VEHICLES),
         linear=expand("<results>/critical_speed/{vehicle}_linear.csv", vehicle=WITH_LINEAR),
         benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
     output:
-        report(
-            "<results>/speeds/vehicle_hunting.png",
-            caption="../report/speeds/vehicle_hunting.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"figure": "hunting over speed"},
-        ),
+        shown("speeds/vehicle_hunting.png", "hunting over speed"),
         "<results>/speeds/vehicle_hunting.svg",
-        report(
-            "<results>/speeds/vehicle_response.png",
-            caption="../report/speeds/vehicle_response.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"figure": "response over speed"},
-        ),
+        shown("speeds/vehicle_response.png", "response over speed"),
         "<results>/speeds/vehicle_response.svg",
-        report(
-            "<results>/speeds/vehicle_timing.csv",
-            caption="../report/speeds/vehicle_timing.rst",
-            category="09 Cost",
-            labels={"table": "timing over vehicles"},
-        ),
-    log:
-        "<logs>/vehicle_over_speed.log",
+        shown("speeds/vehicle_timing.csv", "timing over vehicles", page="cost"),
+    log: "<logs>/vehicle_over_speed.log"
     params:
         titles={vehicle: entry["title"] for vehicle, entry in SPEEDS["vehicles"].items()},
         with_linear=WITH_LINEAR,
         released=SPEEDS["released"],
         disturbed=SPEEDS["disturbed"],
-    script:
-        "../scripts/speeds/vehicle_over_speed.py"
+    script: "../scripts/speeds/vehicle_over_speed.py"
 
 
 rule vehicle_values:
-    message:
-        "Page: vehicle values and their sources"
+    message: "Page: vehicle values and their sources"
     input:
         core="workflow/study/speeds/vehicle_page.py",
         vehicles=sorted(str(path.relative_to(HERE)) for path in HERE.glob("config/vehicles/*.yaml")),
     output:
-        report(
-            "<results>/speeds/vehicle_values.html",
-            caption="../report/speeds/vehicle_values.rst",
-            category="06 Wheelset and trailer vehicle",
-            labels={"table": "values and their sources"},
-        ),
-    log:
-        "<logs>/vehicle_values.log",
-    script:
-        "../scripts/speeds/vehicle_values.py"
+        shown("speeds/vehicle_values.html", "values and their sources"),
+    log: "<logs>/vehicle_values.log"
+    script: "../scripts/speeds/vehicle_values.py"
 
 
 rule speeds_study:

@@ -35,48 +35,36 @@ def sweep_batches(wildcards):
 
 
 rule sweep_batch:
-    message:
-        "Sweep {wildcards.sweep}: batch {wildcards.batch}"
+    message: "Sweep {wildcards.sweep}: batch {wildcards.batch}"
     input:
         core=CORE["sweeps"],
         scenes=SCENES,
         sweep=sweep_file,
     output:
         "<results>/sweeps/{sweep}/{batch}.csv",
-    log:
-        "<logs>/sweep_batch/{sweep}_{batch}.log",
-    benchmark:
-        "<benchmarks>/sweep_batch/{sweep}_{batch}.tsv"
+    log: "<logs>/sweep_batch/{sweep}_{batch}.log"
+    benchmark: "<benchmarks>/sweep_batch/{sweep}_{batch}.tsv"
     resources:
         mem_mb=1000,
         runtime=30,
-    script:
-        "../scripts/sweeps/sweep_batch.py"
+    script: "../scripts/sweeps/sweep_batch.py"
 
 
 rule sweep_table:
-    message:
-        "Sweep {wildcards.sweep}: table and figure"
+    message: "Sweep {wildcards.sweep}: table and figure"
     input:
         core=CORE["sweeps_figures"],
         sweep=sweep_file,
         batches=sweep_batches,
     output:
         table="<results>/sweeps/{sweep}.csv",
-        figure=report(
-            "<results>/sweeps/sweep_{sweep}.png",
-            caption="../report/sweeps/sweep.rst",
-            category="12 Sweeps",
-            labels={"figure": "{sweep}"},
-        ),
+        figure=shown("sweeps/sweep_{sweep}.png", "{sweep}"),
         svg="<results>/sweeps/sweep_{sweep}.svg",
-    log:
-        "<logs>/sweep_table/{sweep}.log",
+    log: "<logs>/sweep_table/{sweep}.log"
     params:
         varied=sweep_keys,
         shown=sweep_shown,
-    script:
-        "../scripts/sweeps/sweep_table.py"
+    script: "../scripts/sweeps/sweep_table.py"
 
 
 rule sweeps:

@@ -8,42 +8,27 @@ CORE["wear"] = CORE["simulation"] + sources(
 
 
 rule wear_evolution:
-    message:
-        "A wheel profile over a distance"
+    message: "A wheel profile over a distance"
     input:
         core=CORE["wear"],
         scenes=SCENES,
         plan=WEAR["plan"],
         table=rules.creep_table.output,
     output:
-        table=report(
-            "<results>/wear/evolution.csv",
-            caption="../report/wear/evolution.rst",
-            category="13 Wear",
-            labels={"table": "evolution of a wheel profile"},
-        ),
-        figure=report(
-            "<results>/wear/evolution.png",
-            caption="../report/wear/evolution.rst",
-            category="13 Wear",
-            labels={"figure": "evolution of a wheel profile"},
-        ),
+        table=shown("wear/evolution.csv", "evolution of a wheel profile"),
+        figure=shown("wear/evolution.png", "evolution of a wheel profile"),
         svg="<results>/wear/evolution.svg",
-    log:
-        "<logs>/wear_evolution.log",
-    benchmark:
-        "<benchmarks>/wear_evolution.tsv"
+    log: "<logs>/wear_evolution.log"
+    benchmark: "<benchmarks>/wear_evolution.tsv"
     params:
         settings=WEAR["settings"],
     threads: 2
-    script:
-        "../scripts/wear/wear_evolution.py"
+    script: "../scripts/wear/wear_evolution.py"
 
 
 # no part of the study; on a line without tight curves, see reports/wear.md
 use rule wear_evolution as wear_100000_km with:
-    message:
-        "A wheel profile over 100 000 km"
+    message: "A wheel profile over 100 000 km"
     input:
         core=CORE["wear"],
         scenes=SCENES,
@@ -53,10 +38,8 @@ use rule wear_evolution as wear_100000_km with:
         table="<results>/wear/100000_km.csv",
         figure="<results>/wear/100000_km.png",
         svg="<results>/wear/100000_km.svg",
-    log:
-        "<logs>/wear_100000_km.log",
-    benchmark:
-        "<benchmarks>/wear_100000_km.tsv"
+    log: "<logs>/wear_100000_km.log"
+    benchmark: "<benchmarks>/wear_100000_km.tsv"
     params:
         settings={"distance": 1.0e8},
     resources:
@@ -64,35 +47,21 @@ use rule wear_evolution as wear_100000_km with:
 
 
 rule wear_influences:
-    message:
-        "What settings and models do to worn profiles"
+    message: "What settings and models do to worn profiles"
     input:
         core=CORE["wear"],
         scenes=SCENES,
         plan=WEAR["plan"],
         table=rules.creep_table.output,
     output:
-        table=report(
-            "<results>/wear/influences.csv",
-            caption="../report/wear/influences.rst",
-            category="13 Wear",
-            labels={"table": "influences on worn profiles"},
-        ),
-        figure=report(
-            "<results>/wear/influences.png",
-            caption="../report/wear/influences.rst",
-            category="13 Wear",
-            labels={"figure": "influences on worn profiles"},
-        ),
+        table=shown("wear/influences.csv", "influences on worn profiles"),
+        figure=shown("wear/influences.png", "influences on worn profiles"),
         svg="<results>/wear/influences.svg",
-    log:
-        "<logs>/wear_influences.log",
-    benchmark:
-        "<benchmarks>/wear_influences.tsv"
+    log: "<logs>/wear_influences.log"
+    benchmark: "<benchmarks>/wear_influences.tsv"
     params:
         settings=WEAR["influences"],
-    script:
-        "../scripts/wear/wear_influences.py"
+    script: "../scripts/wear/wear_influences.py"
 
 
 rule wear_study:
