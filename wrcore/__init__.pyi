@@ -52,9 +52,9 @@ from wrcore.run.output.files import load_runs as load_runs
 from wrcore.run.output.files import write_run as write_run
 from wrcore.run.output.run import Run as Run
 from wrcore.run.session import Session as Session
-from wrcore.run.session import start as start
 from wrcore.run.simulate import simulate as simulate
 from wrcore.run.simulate import simulate_many as simulate_many
+from wrcore.run.start import start as start
 from wrcore.scene.description import Scene as Scene
 from wrcore.scene.description import load_scene as load_scene
 from wrcore.scene.examples import example as example

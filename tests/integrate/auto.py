@@ -25,7 +25,7 @@ from wrcore.contact.search import reduction
 from wrcore.integrate.choice import work, work_of
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.run.simulation import evaluated
+from wrcore.run.output.compute import evaluated
 from wrcore.track.track import track_poses
 
 RTOLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)

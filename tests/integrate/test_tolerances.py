@@ -12,7 +12,7 @@ from wrcore.forces.drive import GRIP
 from wrcore.integrate.integrator import METHODS, STALL_ATTEMPTS, integrate
 from wrcore.integrate.tableaus import ROSENBROCK
 from wrcore.integrate.tolerances import LENGTH, SHARE, lightness, step_tolerances
-from wrcore.run.simulation import evaluated
+from wrcore.run.output.compute import evaluated
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import load_scene
 

@@ -30,7 +30,8 @@ from wrcore.errors.new_files import appearing
 from wrcore.geometry.changing_rails.files import profiles_in, with_profiles
 from wrcore.kernels.named_laws import LawFile
 from wrcore.run.output.channels import DESCRIPTIONS
-from wrcore.run.session import Session, start
+from wrcore.run.session import Session
+from wrcore.run.start import start
 from wrcore.run.state import State
 from wrcore.scene.description import Scene
 from wrcore.scene.reader import existing_file, find_file

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.equations.model import Model
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.forces import law
 from wrcore.forces.drive import COMMANDED, CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
 from wrcore.forces.kinds.actuator import given
@@ -37,14 +38,43 @@ class Input:
         return float(self.places[0]) / self.factor if np.all(self.places == self.places[0]) else float("nan")
 
 
+Values = tuple[np.ndarray, ...]
+"""Values of all inputs of a session, in the order of their names."""
+
+
+class Inputs(dict[str, Input]):
+    """Inputs of a session by name."""
+
+    def present(self) -> Values:
+        """Return a copy of the present values."""
+        return tuple(item.places.copy() for item in self.values())
+
+    def put(self, values: Values) -> None:
+        """Set all inputs to the result of an earlier call of :meth:`present`."""
+        for item, numbers in zip(self.values(), values, strict=True):
+            item.places[:] = numbers
+
+    def set(self, name: str, value: float) -> bool:
+        """Set an input in its unit and return whether it has changed; InputError for another name or out of range."""
+        if name not in self:
+            raise InputError("session", name, one_of(self, name) if self else "this scene has no inputs")
+        item = self[name]
+        if not item.low <= value <= item.high:
+            check_number(value, item.low, item.high, "session", name, item.unit.replace("1", ""))
+        is_changed = bool((item.places != value * item.factor).any())
+        if is_changed:
+            item.places[:] = value * item.factor
+        return is_changed
+
+
 def with_copied_arrays(model: Model) -> Model:
     """Return the model with a copy of its input array, which it otherwise shares with the scene's vehicle."""
     return model._replace(elements=model.elements._replace(directed=model.elements.directed.copy()))
 
 
-def inputs_of(scene: Scene, model: Model) -> dict[str, Input]:
+def inputs_of(scene: Scene, model: Model) -> Inputs:
     """Return the inputs of a compiled scene by name: actuators, motors and brakes, controller and friction."""
-    return {**dict(_of_actuators(scene, model)), **dict(_of_drive(scene, model)), **dict(_of_friction(model))}
+    return Inputs([*_of_actuators(scene, model), *_of_drive(scene, model), *_of_friction(model)])
 
 
 def _of_actuators(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:

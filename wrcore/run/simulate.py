@@ -83,7 +83,7 @@ def simulate(
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
         simulation = Simulation(scene, begin_at, show_progress if progress is None else None)
         run = simulation.advance(output_times(begin, settings["duration"], rate), advance)
-    warn_of_unreached(scene, simulation.places)
+    warn_of_unreached(scene, simulation.outputs.places)
     warn_of_shapes(scene.source, run.counters, rate)
     return run
 

@@ -1,44 +1,30 @@
-"""Integrate a compiled scene section by section in time, and compute the output channels of each section."""
+"""Integrate a compiled scene section by section in time."""
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 import wrcore
-from wrcore.bodies.body import STATE_SIZE, angles, matrix_of
-from wrcore.contact.search import reduction
-from wrcore.equations.energy import energy_channels
-from wrcore.equations.equations_of_motion import Equations
-from wrcore.equations.model import Model, independent_at, workspace
-from wrcore.equations.outputs import check_rail_history, drive_history, evaluations_at, motion_history
+from wrcore.equations.model import Model
 from wrcore.equations.own_law_failures import LawWatch
 from wrcore.errors import InputError
 from wrcore.errors.input_files import digest_of_all
-from wrcore.forces.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
-from wrcore.geometry.irregularity import irregularity_extents
-from wrcore.geometry.track import SIDES
 from wrcore.integrate.integrator import integrate, needed_last
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.kernels.aside import compiled_aside
 from wrcore.run.checkpoints import model_fingerprint
-from wrcore.run.checks.shape_along import ShapesAlong
-from wrcore.run.checks.validity import exceeded, look_up_errors
-from wrcore.run.output.derived import OF_WHEELS, OF_WHEELSETS, asked_for
+from wrcore.run.checks.validity import LOOK_UP_ERRORS
+from wrcore.run.output.compute import ArcLengths, Outputs
 from wrcore.run.output.run import Run
 from wrcore.run.state import State, from_state
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import Scene
-from wrcore.track.flexible_track import track_places
-from wrcore.track.track import track_poses
-from wrcore.wheels.contact_model import is_elliptic, shaped
-from wrcore.wheels.motion import MOTION
 
 DERAILED_Y = 0.05
 """Lateral displacement from the track's centre above which a wheelset has derailed, m (flange tip on the rail: about
@@ -53,12 +39,6 @@ COUNTERS = {
 }  # fmt: skip
 """Counters of a run, with the names of the same quantities in a `Trajectory`."""
 
-TRACK_CHANNELS = (
-    "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
-    "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
-)  # fmt: skip
-"""Channels of a flexible track, in the order of its degrees of freedom (:mod:`wrcore.track.flexible_track`)."""
-
 
 def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
     """Return the counters of a trajectory that begins at a time (s), by their names in runs and sweeps."""
@@ -66,30 +46,35 @@ def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
     return {name: getattr(trajectory, attribute) for name, attribute in COUNTERS.items()} | {"simulated_s": simulated}
 
 
-ON_RAIL = tuple(
-    f"on_rail_{name}" for name in (
-        "y_m", "z_m", "axle_x", "axle_y", "axle_z", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s",
-        "wy_rad_per_s", "wz_rad_per_s", "bend_y_per_m", "bend_z_per_m", "friction",
-    )
-)  # fmt: skip
-"""Channels of a wheel's `WheelMotion`, in the order of its fields, without its side."""
+def integrate_by(settings: dict[str, Any], model: Model, start: Any, times: np.ndarray, **more: Any) -> Trajectory:
+    """Integrate a model by the settings ``integration`` of a scene; ``more`` are further arguments of `integrate`."""
+    return integrate(
+        model, start, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
+        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"], **more,
+    )  # fmt: skip
 
 
-class ArcLengths(NamedTuple):
-    """Arc lengths from which the search for those of the next output starts on a curved track, m."""
-
-    wheelsets: np.ndarray
-    """Arc lengths of the wheelsets, shape (k,); NaN: not known yet."""
-    bodies: np.ndarray
-    """Arc lengths of the bodies, shape (n,)."""
+def joined_counters(before: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+    """Return the counters of two successive sections of a run together; the time of compilation is the first one."""
+    joined = dict(before)
+    for name, value in more.items():
+        if name == "compile_s":
+            joined.setdefault(name, value)
+        elif name == "smallest_step_s":
+            joined[name] = min(value, joined.get(name, value))
+        elif name in LOOK_UP_ERRORS:
+            joined[name] = max(value, joined.get(name, 0.0))
+        else:
+            joined[name] = joined.get(name, 0) + value
+    return joined
 
 
 class Simulation:
-    """A compiled scene and its present condition: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or
-    state (size,)) of the next section in time and the ``arc_lengths`` for its channels.
+    """A compiled scene and its present condition: its ``outputs``, the fingerprint ``mark`` of its ``model``, and the
+    ``start`` (Checkpoint or state (size,)) of the next section in time.
 
     InputError if the run cannot begin at ``start``. ``progress`` wraps the patches of a creep table that has to be
-    built; ``shared`` is passed to :func:`wrcore.scene.compile.compile_scene`.
+    built.
     """
 
     def __init__(
@@ -97,26 +82,22 @@ class Simulation:
         scene: Scene,
         start: Checkpoint | np.ndarray | None = None,
         progress: Callable | None = None,
-        shared: dict[Any, Any] | None = None,
     ) -> None:
         self._began = time.perf_counter()
         self.scene = scene
         method = scene.data["integration"]["method"]
-        self.model, state = compile_scene(
-            scene, progress, shared, lambda model: compiled_aside(partial(needed_last, model, method))
+        model, state = compile_scene(
+            scene, progress, meanwhile=lambda model: compiled_aside(partial(needed_last, model, method))
         )
-        self.mark = model_fingerprint(self.model)
+        self.outputs, self.mark = Outputs(scene, model), model_fingerprint(model)
         self.start, self._moved = state, 0.0
-        self._shapes = ShapesAlong(scene)
-        unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
-        self.arc_lengths = ArcLengths(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
             self.begin_at(start)
 
     @property
-    def places(self) -> np.ndarray:
-        """Arc lengths (k,) of the wheelsets at the last output, m."""
-        return self.arc_lengths.bodies[self.model.bodies.wheelsets]
+    def model(self) -> Model:
+        """Compiled model."""
+        return self.outputs.model
 
     def begin_at(self, start: Checkpoint | np.ndarray, arc_lengths: ArcLengths | None = None) -> None:
         """Set the start of the next section; a checkpoint must be of exactly this model and method."""
@@ -130,12 +111,12 @@ class Simulation:
                 expected = f"expected that of the start, {start.method}, got {method}"
                 raise InputError(self.scene.source, "integration.method", expected)
         elif (begun := from_state(self.model, self.scene.vehicle, start, self.scene.source)) is not self.model:
-            self.model, self.mark = begun, model_fingerprint(begun)
+            self.outputs.model, self.mark = begun, model_fingerprint(begun)
             self._moved = start.frame - begun.speed * start.t
         if arc_lengths is not None:
-            if [known.shape for known in arc_lengths] != [known.shape for known in self.arc_lengths]:
+            if [known.shape for known in arc_lengths] != [known.shape for known in self.outputs.arc_lengths]:
                 raise InputError(self.scene.source, "start", "expected as many places as wheelsets and bodies")
-            self.arc_lengths = arc_lengths
+            self.outputs.arc_lengths = arc_lengths
         self.start = start
 
     def advance(
@@ -150,10 +131,7 @@ class Simulation:
         """
         settings = self.scene.data["integration"]
         begin = self.start.t if isinstance(self.start, Checkpoint) else float(times[0])
-        trajectory = integrate(
-            self.model, self.start, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
-            settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
-        )  # fmt: skip
+        trajectory = integrate_by(settings, self.model, self.start, times, progress=progress, stop=stop)
         compiled = time.perf_counter() - self._began - trajectory.wall_s
         run = self.run_of(*self._with_channels(trajectory, begin, compiled))
         self.start = run.end or self.start
@@ -164,9 +142,9 @@ class Simulation:
         """Arguments of `run_of`; a law of the user that raises an error at output times ends the run as failed."""
         watch, count = LawWatch(self.model), len(trajectory.t)
         if not watch.names:
-            return trajectory, begin, compiled, *self.channels(trajectory)
+            return trajectory, begin, compiled, *self.outputs.channels(trajectory)
         while True:
-            found, fault = watch.fault_of(self.channels, trajectory)
+            found, fault = watch.fault_of(self.outputs.channels, trajectory)
             if fault and trajectory.status != "failed":
                 trajectory = replace(trajectory, status="failed", reason=f"{fault} at an output time", end=None)
             if found is not None or not count:
@@ -187,13 +165,6 @@ class Simulation:
             end, trajectory.end_t, self._end_state(trajectory),
         )  # fmt: skip
 
-    def observe(self, model: Model, times: np.ndarray, states: np.ndarray) -> Run:
-        """Return a run with the channels of states (n, size) at times (n,), s, of a variant of the scene's model."""
-        seen = copy.copy(self)
-        seen.model = model
-        groups, _ = seen.channels(Trajectory("", times, states, "completed", ""))
-        return Run(self.scene.data, "completed", "", times, groups)
-
     def _end_state(self, trajectory: Trajectory) -> State | None:
         """Return the state at the end of a trajectory as a `State`, or None without a state."""
         return None if trajectory.end_state is None else self.state_at(trajectory.end_t, trajectory.end_state)
@@ -202,220 +173,6 @@ class Simulation:
         """Return a state vector at a time (s) as a `State` with time, moving frame and names of the vehicle."""
         names = self.scene.vehicle.name, *self.scene.vehicle.body_names
         return State(state, t, self._moved + self.model.speed * t, names)
-
-    def channels(
-        self, trajectory: Trajectory, equations: Equations | None = None
-    ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, Any]]:
-        """Return output channels by group, and counters of exceeded limits.
-
-        Contacts are evaluated again at the output times, with ``equations`` of this model if they are given.
-        """
-        model, states, equations = self.model, trajectory.states, self._from_here(equations)
-        evaluations = patches, _, _ = evaluated(model, trajectory, equations)
-        poses, axes = self._poses(states, range(len(model.bodies.mass)))
-        energies = energy_channels(model, self._workspace(), trajectory.t, states) if self._wants("energy") else None
-        if len(states):
-            self.arc_lengths = ArcLengths(equations.work.arc_lengths.copy(), poses[-1, :, 0].copy())
-        groups = self._of_bodies(range(len(model.bodies.mass)), states, evaluations, poses, axes)
-        self._add_wheel_motions(groups, trajectory, equations)
-        self._add_check_rails(groups, trajectory, equations)
-        if energies is not None:
-            groups["energy"] = energies
-        groups |= self._drive_channels(trajectory, equations)
-        standing = poses[:, model.bodies.wheelsets]
-        extents = irregularity_extents(model.track.irregularity)
-        first, last = extents[:, 0].min(initial=np.inf), extents[:, 1].max(initial=-np.inf)
-        beyond = np.sum(standing[..., 0] > last) if len(extents) else 0
-        before = np.sum(standing[..., 0].max(axis=1, initial=-np.inf) < first) if len(extents) else 0
-        limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
-        limits |= self._shapes.counts(patches, standing[..., 0], standing[..., 4])
-        limits |= {"before_irregularity": int(before), "beyond_irregularity": int(beyond)}
-        return groups, limits | look_up_errors(equations.arguments[1].value.contact, patches)
-
-    def present(
-        self, trajectory: Trajectory, asked: set[str], places: np.ndarray, equations: Equations
-    ) -> dict[str, dict[str, np.ndarray]]:
-        """Return channels of the requested groups, and of groups of the same bodies, with ``equations`` of this model.
-
-        ``places`` are approximate arc lengths (k,) of its wheelsets, m.
-        """
-        names, wheelsets = self.scene.vehicle.body_names, self.model.bodies.wheelsets
-        if len(places) and np.isfinite(places[0]):
-            nominal = self.scene.vehicle.positions[:, 0]
-            self.arc_lengths = ArcLengths(places.copy(), nominal + places[0] - nominal[wheelsets[0]])
-        bodies = [body for body, name in enumerate(names) if any(group.split("/")[0] == name for group in asked)]
-        groups: dict[str, dict[str, np.ndarray]] = {}
-        if bodies:
-            evaluations = evaluated(self.model, trajectory, self._from_here(equations))
-            groups = self._of_bodies(bodies, trajectory.states, evaluations, *self._poses(trajectory.states, bodies))
-            self._add_wheel_motions(groups, trajectory, equations)
-            self._add_check_rails(groups, trajectory, equations)
-        if any(group.startswith(("drive/", "control/")) for group in asked):
-            groups |= self._drive_channels(trajectory, equations)
-        if "energy" in asked and self._wants("energy"):
-            groups["energy"] = energy_channels(self.model, self._workspace(), trajectory.t, trajectory.states)
-        return groups
-
-    def _wants(self, *kinds: str) -> bool:
-        """Whether the scene requests at least one of some kinds of channels (``output.channels``)."""
-        return not set(kinds).isdisjoint(self.scene.data["output"]["channels"])
-
-    def _of_bodies(self, bodies, states, evaluations, poses, axes):
-        """Return channels of bodies, by number, and of their wheels by group, from `evaluated` and `_poses`."""
-        scene, model, (patches, bounds, rates) = self.scene, self.model, evaluations
-        wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
-        groups, numbers = {}, {int(body): k for k, body in enumerate(wheelsets)}
-        for body in bodies:
-            name = scene.vehicle.body_names[body]
-            part, k = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), numbers.get(body)
-            motion = states[:, part], rates[:, part], poses[:, body], axes[:, body]
-            groups[name] = _body_channels(*motion, wanted, pitches=not model.bodies.spins[body])
-            if "pose" in wanted and not model.track.tangent:
-                groups[name]["s_m"] = poses[:, body, 0]
-            if "pose" in wanted and k is not None and len(model.flexible_track.mass):
-                groups[name] |= self._track_places(states, k)
-            if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
-                groups[name] |= self._rolling_rates(states, body)
-            if k is None or not self._wants("contact", *OF_WHEELS, *OF_WHEELSETS):
-                continue
-            contacts = self._contact_channels(name, patches[:, k])
-            if "contact" in wanted:
-                groups |= contacts
-            moving = {name: _body_channels(*motion, ("pose", "velocity"))}
-            for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
-                groups[group] = groups.get(group, {}) | channels
-            if "contact" in wanted and scene.detection == "auto":
-                groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
-                spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
-                groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
-        return groups
-
-    def _contact_channels(self, name, patches):
-        """Return channels of the contacts of a wheelset's wheels, by group."""
-        groups = {}
-        for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
-            channels = {key: rows[..., column] for key, column in reduction.CHANNELS.items()}
-            if not is_elliptic.py_func(self.model.contact):
-                channels["p_max_Pa"] = rows[..., reduction.P_MAX]
-            if shaped(self.model.contact):
-                channels["psi"] = rows[..., reduction.PSI]
-            groups[f"{name}/{side}"] = channels
-        return groups
-
-    def _rolling_rates(self, states, body):
-        """Return channels of the rolling rates of independently rotating wheels, rad/s."""
-        bodies = self.model.bodies
-        j = int(np.flatnonzero(bodies.wheelsets[bodies.independent[:, 0]] == body)[0])
-        part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        mean = np.array([matrix_of(one[3:7])[:, 1] @ one[10:13] for one in part])
-        half = states[:, independent_at(bodies, j)]
-        return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
-
-    def _track_places(self, states, k):
-        """Return channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
-        places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
-        return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
-
-    def _add_wheel_motions(self, groups, trajectory, equations):
-        """Add channels of position and velocity of wheels relative to their rails, if the scene requests them."""
-        if not self._wants("wheel_motion"):
-            return
-        motions = motion_history(self._from_here(equations), trajectory.t, trajectory.states)
-        for k, body in enumerate(self.model.bodies.wheelsets):
-            name = self.scene.vehicle.body_names[body]
-            for i, side in enumerate(SIDES if name in groups else ()):
-                groups[f"{name}/{side}"] |= dict(zip(ON_RAIL, motions[:, k, i, MOTION.y :].T, strict=True))
-
-    def _add_check_rails(self, groups, trajectory, equations):
-        """Add channels of the forces of check rails, N, to the groups of wheelsets, if the scene has check rails."""
-        if not len(self.model.check_rails.rows) or not self._wants("contact"):
-            return
-        forces = check_rail_history(self._from_here(equations), trajectory.t, trajectory.states)
-        for k, body in enumerate(self.model.bodies.wheelsets):
-            group = groups.get(self.scene.vehicle.body_names[body])
-            if group is not None:
-                group |= {f"check_rail_{side}_N": forces[:, k, i] for i, side in enumerate(SIDES)}
-
-    def _drive_channels(self, trajectory, equations):
-        """Return channels of motors and brakes (torque, power), speed controller (force, speed) and control laws
-        (outputs, states), by group; empty if the scene has none of them."""
-        spec, laws = self.scene.data.get("drive") or {"motors": [], "brakes": []}, self.scene.data.get("control", {})
-        if not any(spec.values()) and not laws:
-            return {}
-        found = drive_history(self._from_here(equations), trajectory.t, trajectory.states)
-        torques, rates, control, outputs = found
-        groups = {
-            f"drive/{item['name']}": {"torque_Nm": torques[:, i], "power_W": torques[:, i] * rates[:, i]}
-            for i, item in enumerate([*spec["motors"], *spec["brakes"]])
-        }
-        if "controller" in spec:
-            groups["drive/controller"] = {"force_N": control[:, 0], "wanted_m_per_s": control[:, 1]}
-        motors = [item["name"] for item in spec["motors"]]
-        for (name, item), row in zip(sorted(laws.items()), self.model.controls.rows, strict=True):
-            given = outputs[:, row[OUTPUTS] : row[OUTPUTS_END]].T
-            names = [f"{output}_{'Nm' if output in motors else 'N'}" for output in item["outputs"]]
-            states = trajectory.states[:, row[STATES] : row[STATES_END]].T
-            numbered = {f"state_{k}": values for k, values in enumerate(states)}
-            groups[f"control/{name}"] = dict(zip(names, given, strict=True)) | numbered
-        return groups
-
-    def _workspace(self):
-        work = workspace(self.model)
-        work.arc_lengths[:] = self.arc_lengths.wheelsets
-        return work
-
-    def _from_here(self, equations, model=None):
-        """Return equations that search arc lengths near those of the last output; new ones if none are given."""
-        if equations is None:
-            return Equations(model or self.model, self._workspace())
-        equations.work.arc_lengths[:] = self.arc_lengths.wheelsets
-        return equations
-
-    def _poses(self, states, bodies):
-        """Return arc length, y, z, roll, yaw and pitch of bodies in the track's axes, shape (n, all bodies, 6), and
-        these axes, shape (n, all bodies, 3, 3); only the bodies with the given numbers are filled."""
-        count = len(self.model.bodies.mass)
-        poses, axes = np.empty((len(states), count, 6)), np.broadcast_to(np.eye(3), (len(states), count, 3, 3))
-        if not self.model.track.tangent:
-            axes = axes.copy()
-        for body in bodies:
-            at = STATE_SIZE * body
-            if self.model.track.tangent:
-                roll, pitch, yaw = angles(states[:, at + 3 : at + 7])
-                poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw, pitch])
-            else:
-                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.arc_lengths.bodies[body])
-        return poses, axes
-
-
-def evaluated(
-    model: Model, trajectory: Trajectory, equations: Equations | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the equations of motion again at a run's output times, with ``equations`` of this model if given.
-
-    Return patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left first, NaN where absent; bounds (n, wheelsets, 2)
-    of planar detection's error (``auto`` only), m; rates (n, size), time derivatives of the states.
-    """
-    shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
-    patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
-    rates = np.full(trajectory.states.shape, np.nan)
-    arguments = (equations or Equations(model)).arguments
-    evaluations_at(trajectory.t, trajectory.states, *arguments, rates, patches, bounds)
-    return patches, bounds, rates
-
-
-def _body_channels(state, rate, pose, axes, wanted, pitches=False):
-    """Return channels of a body in the axes of the track at its position; a spinning body has no pitch."""
-    channels: dict[str, np.ndarray] = {}
-    if "pose" in wanted:
-        names = ("x_m", "y_m", "z_m", "roll_rad", "yaw_rad", *(("pitch_rad",) if pitches else ()))
-        channels |= dict(zip(names, pose.T, strict=False))
-    kinds = {"velocity": (("v{}_m_per_s", state[:, 7:10]), ("w{}_rad_per_s", state[:, 10:13]))}
-    kinds["acceleration"] = (("a{}_m_per_s2", rate[:, 7:10]),)
-    for name, vectors in (pair for kind, pairs in kinds.items() if kind in wanted for pair in pairs):
-        along = np.einsum("nij,ni->jn", axes, vectors)
-        channels |= {name.format(axis): values for axis, values in zip("xyz", along, strict=True)}
-    return channels
 
 
 def flat(settings, prefix=""):

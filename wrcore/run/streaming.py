@@ -31,11 +31,11 @@ from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
 from wrcore.run.checks.reach import check_reach, warn_of_unreached
 from wrcore.run.checks.shape_along import warn_of_shapes
-from wrcore.run.checks.validity import LOOK_UP_ERRORS
+from wrcore.run.output.compute import ArcLengths
 from wrcore.run.output.files import join_runs, read_part, write_going_on, write_run
 from wrcore.run.output.run import Run
 from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
-from wrcore.run.simulation import ArcLengths, Simulation
+from wrcore.run.simulation import Simulation, joined_counters
 from wrcore.scene.description import Scene
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
@@ -124,7 +124,7 @@ def simulate_to(
                     blocks.add(run, simulation, end or summary.over)
         if blocks is not None:
             blocks.join(summary)
-    warn_of_unreached(scene, simulation.places)
+    warn_of_unreached(scene, simulation.outputs.places)
     warn_of_shapes(scene.source, summary.counters, scene.data["output"]["rate"])
     return summary.run(), interrupts.caught
 
@@ -164,15 +164,7 @@ class Summary:
             self.first = float(run.t[0]) if math.isnan(self.first) else self.first
             self.t = float(run.t[-1])
         self.over, self.last = run.status != "completed", run
-        for name, value in run.counters.items():
-            if name == "smallest_step_s":
-                self.counters[name] = min(value, self.counters.get(name, math.inf))
-            elif name in LOOK_UP_ERRORS:
-                self.counters[name] = max(value, self.counters.get(name, 0.0))
-            elif name != "compile_s":
-                self.counters[name] = self.counters.get(name, 0) + value
-            else:
-                self.counters.setdefault(name, value)
+        self.counters = joined_counters(self.counters, run.counters)
 
     def run(self):
         """Return the last block with the counters of all blocks."""
@@ -250,7 +242,7 @@ class Blocks:
 
     def add(self, run, simulation, last):
         """Write a block: as a part, or as the run file if it is the only block."""
-        also = partial(write_going_on, mark=self.mark, places=simulation.arc_lengths)
+        also = partial(write_going_on, mark=self.mark, places=simulation.outputs.arc_lengths)
         with self._told():
             if last and not self.count:
                 write_run(self.path, run, also)

@@ -32,11 +32,10 @@ from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.errors.checked_yaml import unit_of_key
 from wrcore.errors.input_files import check_regular, check_unchanged
 from wrcore.errors.new_files import appearing, held, remove_folder, remove_remains
-from wrcore.integrate.integrator import integrate
 from wrcore.run.output.channels import unit_of
 from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times
-from wrcore.run.simulation import DERAILED_Y, counters_of
+from wrcore.run.simulation import counters_of, integrate_by
 from wrcore.scene.changes import with_value
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import Scene, changed_by_file
@@ -175,10 +174,7 @@ def _run(task: _Task, measures: list[str]) -> _Outcome:
     model, state = compile_scene(scene, shared=task.shared)
     settings, equations = scene.data["integration"], equations_of(model, task.shared)
     times = _times(settings["duration"], scene.data["output"]["rate"])
-    trajectory = integrate(
-        model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
-        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"], equations=equations,
-    )  # fmt: skip
+    trajectory = integrate_by(settings, model, state, times, equations=equations)
     starts = scene.vehicle.positions[model.bodies.wheelsets, 0]
     motion = wheelset_motion(model, starts, trajectory.states)
     forces = wheel_forces(model, trajectory) if set(measures) & set(FORCES) else None

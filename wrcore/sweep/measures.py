@@ -36,8 +36,8 @@ from wrcore.contact.search import reduction
 from wrcore.equations.model import Model
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.motion import hunting_frequency
+from wrcore.run.output.compute import evaluated
 from wrcore.run.output.derived import UNLOADED, creep_work
-from wrcore.run.simulation import evaluated
 from wrcore.track.track import track_poses
 
 

@@ -8,8 +8,8 @@ from wrcore.analysis.contact.in_run import WheelInRun, patch_in_run
 from wrcore.contact.search.reduction import NORMAL
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
+from wrcore.run.output.compute import ON_RAIL
 from wrcore.run.simulate import simulate
-from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import load_scene
 from wrcore.wheels.motion import MOTION, WheelMotion
 

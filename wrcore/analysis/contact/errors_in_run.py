@@ -17,8 +17,8 @@ from wrcore.equations.equations_of_motion import Equations
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.track import SIDES
+from wrcore.run.output.compute import ON_RAIL
 from wrcore.run.output.run import Run
-from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.compile import compile_scene
 from wrcore.scene.description import Scene, Source, load_scene
 from wrcore.wheels.force import press_wheels

@@ -23,8 +23,8 @@ from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.errors.input_files import digest_of_all
 from wrcore.errors.messages import warn
 from wrcore.geometry.track import SIDES
+from wrcore.run.output.compute import ON_RAIL
 from wrcore.run.output.run import Run
-from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene, Source, scene_of
 from wrcore.wheels.motion import WheelMotion
 

@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.analysis.contact.strip_fields import ends_on_profiles, patch_of_strips
 from wrcore.contact.creepage import creepages
 from wrcore.contact.hertz import contact_modulus, hertz_table
 from wrcore.contact.normal import solve
-from wrcore.contact.normal.gap import UR, U, frame_of_overlaps, group_end
+from wrcore.contact.normal.gap import frame_of_overlaps, group_end
 from wrcore.contact.normal.strips import STEPS
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.rigid.height_at_load import ROLL_SLOPE, height_at_load, height_of_zero, settle
-from wrcore.contact.rolling.rolling import read_field
 from wrcore.contact.search import reduction as columns
 from wrcore.contact.search.detection import DETECTIONS, axle_direction, find_patches
 from wrcore.contact.search.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
@@ -258,57 +258,15 @@ class LoadedWheels:
             else:
                 has = {"on_fixed": on_fixed}
                 if fields:
-                    has |= {"patch": self._fields(out[0], found.load, pose, friction, left.vx < 0.0)}
-                    has |= {"places": self._places()}
+                    strips, back = self._still.strips, left.vx < 0.0
+                    has |= {"patch": patch_of_strips(work, strips, out[0], found.load, pose, friction, back)}
+                    has |= {"places": ends_on_profiles(work)}
                 yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, **has)
             first, group = last, group + 1
 
     def _is_rough(self, which, left, first, last, on_grid):
         """Whether a patch (side, number) is to be solved on grids although strips, or a grid, have a solution."""
         return False
-
-    def _fields(self, row, load, pose, friction, back):
-        """Return the `Patch` of the strips solved last, with their panels as cells, relative to the centroid of
-        pressure; a wheel that rolls ``back`` was solved with the direction of travel reversed."""
-        turn = -1.0 if back else 1.0
-        work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
-        count, slender, _ = work.solved
-        rolling, library = (work.slender, settings.slender) if slender else (work.rolling, settings.library)
-        field = np.empty((9, count * library.panels.n))
-        read_field(library.panels, count, rolling, field)
-        tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
-        rows = (solve.CENTRE, solve.OWN_WIDTH, solve.HALF_LENGTH, solve.MIDDLE, solve.WINDOW)
-        centre, width, half, middle, window = work.strips[list(rows), :count]
-        even = solve.even_length(half, width, window)  # strips as rectangles of equal area
-        longer = load / work.sums[solve.LOAD] * (half / even)[:, None]
-        edges = middle[:, None] + turn * even[:, None] * library.panels.edges
-        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[solve.MEAN_X], work.sums[solve.MEAN_S]
-        slips = slides > 0.0
-        cells = (
-            0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, sign * like * (centre - mean_s)[:, None],
-            turn * (edges[:, :-1] - edges[:, 1:]), like * width[:, None], pressure * longer, tx * longer,
-            turn * sign * ts * longer, np.where(slips, sx, 0.0), np.where(slips, turn * sign * ss, 0.0), ~slips,
-        )  # fmt: skip
-        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (solve.S_MIN, solve.S_MAX))
-        ends = (*(work.sums[k] - mean_x for k in (solve.X_MIN, solve.X_MAX)), *s_ends)
-        return Patch(
-            *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
-            *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
-            tuple(map(float, row[[columns.X, columns.Y, columns.Z]])), friction, pose[0], float(row[columns.P_MAX]),
-            tuple(map(float, ends)), pose[1:],
-        )  # fmt: skip
-
-    def _places(self):
-        """Return `Found.places` of the strips solved last; the ends are interpolated between the strips' middles."""
-        count = self._work.solved[0]
-        centre, width = self._work.strips[:2, :count]
-        known = np.r_[centre[0] - width[0], centre, centre[-1] + width[-1]]
-        ends = centre + 0.5 * np.array([-width, width])
-        found = []
-        for u in self._work.normal.gap[:count, [U, UR]].T:
-            first, last = (u[1] - u[0]) / (centre[1] - centre[0]), (u[-1] - u[-2]) / (centre[-1] - centre[-2])
-            found.append(np.interp(ends, known, np.r_[u[0] - first * width[0], u, u[-1] + last * width[-1]]))
-        return np.array(found)
 
     def _on_grid(self, row, left, first, last, pose, motion, friction):
         """Return `Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""

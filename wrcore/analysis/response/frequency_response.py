@@ -28,7 +28,8 @@ from wrcore.forces.drive import undriven
 from wrcore.geometry.irregularity import CHANNELS, MEANS, IrregularityData, combine
 from wrcore.geometry.path import tangent_path
 from wrcore.integrate.trajectory import Trajectory
-from wrcore.run.simulation import Simulation, evaluated
+from wrcore.run.output.compute import evaluated
+from wrcore.run.simulation import Simulation
 from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
 from wrcore.track.track import TrackModel
 
@@ -143,7 +144,7 @@ class _Systems:
 
     def _observed(self, model, times, states):
         """Return the outputs (n, p) of states (n, size) at times (n,), s; for accelerations the velocities."""
-        run = self.simulation.observe(model, times, states)
+        run = self.simulation.outputs.observe(model, times, states)
         columns = []
         for name, _ in self.outputs:
             group, _, channel = name.rpartition(".")
