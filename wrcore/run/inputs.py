@@ -5,6 +5,7 @@ Kernels read these arrays at every evaluation, so a new value needs no compilati
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -68,8 +69,10 @@ class Inputs(dict[str, Input]):
 
 
 def with_copied_arrays(model: Model) -> Model:
-    """Return the model with a copy of its input array, which it otherwise shares with the scene's vehicle."""
-    return model._replace(elements=model.elements._replace(directed=model.elements.directed.copy()))
+    """Return the model with copies of its input arrays, which it otherwise shares with the scene."""
+    elements = model.elements._replace(directed=model.elements.directed.copy())
+    drive, friction = copy.deepcopy((model.drive, model.friction))
+    return model._replace(elements=elements, drive=drive, friction=friction)
 
 
 def inputs_of(scene: Scene, model: Model) -> Inputs:
