@@ -6,7 +6,7 @@ the contact model of the run, and with ``exact``. Both evaluations include the d
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -83,7 +83,7 @@ def _row(of_run, exact, friction):
 
 def _exact_scene(scene):
     """Return the scene with exact contact and the creep law of exact contact."""
-    changes = {"contact.patch": "exact"}
+    changes: dict[str, Any] = {"contact.patch": "exact"}
     if scene.data["contact"]["creep"]["model"] != "table":
         changes["contact.creep"] = {"model": "table", "least_speed": scene.data["contact"]["creep"]["least_speed"]}
     return load_scene(scene, changes)
