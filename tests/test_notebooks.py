@@ -44,4 +44,4 @@ def test_no_numerics_of_their_own(path):
     assert not [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.While | ast.Lambda)]
     modules = {node.module.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
     modules |= {name.name.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.Import) for name in n.names}
-    assert modules <= {"wrcore", "study", "numpy", "pandas", "os", "pathlib"}
+    assert modules <= {"wrcore", "numpy", "pandas", "os", "pathlib"}

@@ -56,8 +56,12 @@ def test_the_package_alone_pulls_no_snakemake_and_no_jupyter(installed):
     needs = [re.match(r"([\w.-]+)([^;]*);?(.*)", line).groups() for line in metadata.get_all("Requires-Dist")]
     always = {name for name, _, marker in needs if "extra" not in marker}
     assert always == {"numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "pyyaml", "jsonschema", "tqdm"}
-    study = {name for name, _, marker in needs if re.search(r"extra == .study.", marker)}
-    assert study == {"snakemake", "ipykernel", "jupyterlab", "nbclient", "nbconvert"}
+    extras = {
+        extra: {name for name, _, marker in needs if re.search(f"extra == .{extra}.", marker)}
+        for extra in ("notebooks", "study")
+    }
+    assert extras["notebooks"] == {"ipykernel", "jupyterlab"}
+    assert extras["study"] == extras["notebooks"] | {"snakemake", "nbclient", "nbconvert"}
     assert metadata["Version"] == __version__
 
 

@@ -277,22 +277,22 @@ SCENE = ("vehicle", "balance", "scene")
 RUN = (*CONTACT, *FORCES, "integrate", *SCENE, "run")
 VEHICLE = ("analysis/assessment/wheels",)
 LOADED = (*CONTACT, *FORCES, "analysis/contact/loaded", "analysis/contact/poses")
-STYLE = ("analysis/pictures/style", "study/style", "study/report/legible")
+STYLE = ("analysis/pictures/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep", "contact/rolling"),
-    "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws"),
-    "creep_figures": sources("kernels", "creep", "contact/rolling", "study/creep", *STYLE),
-    "geometry": sources(*LOADED, *SCENE, "study/paper/motion", "study/paper/tables"),
+    "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws", "analysis/creep_curves"),
+    "creep_figures": sources("kernels", "creep", "contact/rolling", "study/creep", "analysis/creep_curves", "analysis/pictures/plot_creep", *STYLE),
+    "geometry": sources(*LOADED, *SCENE, "analysis/motion", "study/paper/tables"),
     "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
-    "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
+    "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/contact/rigid", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN, "study/creep_table"),
-    "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
-    "vehicle_figures": sources("run", *VEHICLE, *STYLE, "study/speeds"),
-    "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
+    "vehicle": sources(*VEHICLE, "analysis/motion", "study/speeds/sweep", "study/speeds/tables"),
+    "vehicle_figures": sources("run", *VEHICLE, *STYLE, "analysis/motion", "analysis/pictures/plot_motion", "study/speeds"),
+    "accuracy": sources(*VEHICLE, "analysis/accuracy"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
-    "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
-    "paper": sources("run", "study/paper/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "study/paper", "study/contact/surface"),
+    "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "analysis/accuracy", "study/accuracy"),
+    "paper": sources("run", "analysis/motion", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "analysis/motion", "analysis/pictures/plot_motion", "study/paper", "study/contact/surface"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

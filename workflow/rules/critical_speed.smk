@@ -6,7 +6,7 @@ CORE["critical_speed"] = CORE["simulation"] + sources(
     "analysis/stability/modes", "analysis/stability/stability", "analysis/stability/limit_cycles",
     "study/critical_speed/tables",
 )  # fmt: skip
-CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "study/critical_speed")
+CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "analysis/pictures/plot_response", "study/critical_speed")
 
 
 wildcard_constraints:

@@ -7,10 +7,11 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from study.speeds.tables import cost_table, hunting, speed_row
+from study.speeds.tables import cost_table, speed_row
 from tests.conftest import ELLIPTIC
 from tests.synthetic import hunting_run
 from wrcore.analysis.assessment import wheels as av
+from wrcore.analysis.motion import hunting
 
 
 @pytest.fixture

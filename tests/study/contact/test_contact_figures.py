@@ -6,9 +6,10 @@ import pytest
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.report.legible import save_figure
-from study.style import LINES
+from wrcore.analysis.contact import rigid
+from wrcore.analysis.pictures import plot_contact
 from wrcore.analysis.pictures.plot_contact import fig_contact_location
-from wrcore.analysis.pictures.style import ACCENT
+from wrcore.analysis.pictures.style import ACCENT, LINES
 from wrcore.contact.rigid.conicity import conicity_curve
 from wrcore.contact.rigid.first_touch import first_touch
 from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
@@ -52,7 +53,7 @@ def test_contact_location_joins_the_touching_points(pair, table, s1002, uic60):
 
 
 def test_rolling_radius_difference_in_mm(table):
-    axes = figures_contact.fig_rolling_radius_difference({"rigid": table}).axes[0]
+    axes = plot_contact.fig_rolling_radius_difference({"rigid": table}).axes[0]
     drawn = lines(axes, "rigid").get_xydata()
     assert drawn[:, 0] == pytest.approx(np.arange(-6, 7), abs=1e-9)
     assert drawn[9, 1] == pytest.approx(0.995, rel=2e-3)  # 3 mm: see test_conicity.RADIUS_DIFFERENCE
@@ -60,7 +61,7 @@ def test_rolling_radius_difference_in_mm(table):
 
 
 def test_contact_angle_in_mrad(table):
-    axes = figures_contact.fig_contact_angle({"rigid": table}).axes[0]
+    axes = plot_contact.fig_contact_angle({"rigid": table}).axes[0]
     assert lines(axes, "rigid, left").get_ydata() == pytest.approx(1e3 * table.contact_angle_left_rad)
     right = lines(axes, "rigid, right").get_ydata()
     assert right == pytest.approx(-lines(axes, "rigid, left").get_ydata()[::-1], abs=1e-6)  # mirror image
@@ -70,7 +71,7 @@ def test_contact_angle_in_mrad(table):
 def test_conicity_with_the_band_of_the_standard(pair):
     curve = conicity_curve(pair, 1e-3 * np.arange(1, 6))
     reference = (np.array([2e-3, 3e-3]), np.array([0.04, 0.2]))
-    axes = figures_contact.fig_conicity({"ours": curve}, reference).axes[0]
+    axes = plot_contact.fig_conicity({"ours": curve}, reference).axes[0]
     drawn = lines(axes, "ours").get_xydata()
     assert drawn[2] == pytest.approx([3.0, 0.1805], rel=1e-2)  # without roll, see test_conicity.ONE_IN_40
     band = axes.collections[0].get_paths()[0].vertices
@@ -91,8 +92,8 @@ def test_files_are_reproducible(pair, table, tmp_path):
 
 
 def test_conicity_of_pairs_with_and_without_roll(pair):
-    table = analysis_contact.conicity_table({"ours": pair}, 1e-3 * np.arange(1, 6))
-    axes = figures_contact.fig_conicity_of_pairs(table).axes[0]
+    table = rigid.conicity_table({"ours": pair}, 1e-3 * np.arange(1, 6))
+    axes = plot_contact.fig_conicity_of_pairs(table).axes[0]
     # 3 mm: 0.1836 and 0.1805, see test_conicity.ONE_IN_40
     assert lines(axes, "ours").get_xydata()[2] == pytest.approx([3.0, 0.1836], rel=1e-2)
     assert axes.get_lines()[1].get_xydata()[2] == pytest.approx([3.0, 0.1805], rel=1e-2)
@@ -100,8 +101,8 @@ def test_conicity_of_pairs_with_and_without_roll(pair):
 
 
 def test_location_with_yaw_draws_one_line_per_yaw(benchmark_pair):
-    table = analysis_contact.location_with_yaw(benchmark_pair, [0.001, 0.003], [0.0, 0.01])
-    across, along = figures_contact.fig_location_with_yaw(table).axes
+    table = rigid.location_with_yaw(benchmark_pair, [0.001, 0.003], [0.0, 0.01])
+    across, along = plot_contact.fig_location_with_yaw(table).axes
     left = table[(table.side == "left") & (table.yaw_rad == 0.01)]
     drawn = lines(across, "yaw 10 mrad").get_xydata()
     assert drawn == pytest.approx(1e3 * left[["y_m", "u_wheel_m"]].to_numpy())

@@ -10,6 +10,7 @@ from study.contact import search
 from study.contact import tables as study
 from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
+from wrcore.analysis.contact import rigid
 from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.hertz import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.rigid.height_at_load import height_at_load
@@ -50,7 +51,7 @@ def test_pair_of_the_study_is_the_benchmark_pair(benchmark_pair):
 
 def test_conicity_of_the_pair_at_three_millimetres(s1002, uic60):
     # S1002/UIC60-MBench 1:40, 3 mm: 0.1836 with and 0.1805 without roll, within 1 % (rigid-geometry code).
-    table = study.conicity_table({"one": WheelsetOnTrack.alike(s1002, uic60)}, np.array([2e-3, 3e-3]))
+    table = rigid.conicity_table({"one": WheelsetOnTrack.alike(s1002, uic60)}, np.array([2e-3, 3e-3]))
     assert table.conicity_with_roll[1] == pytest.approx(0.1836, rel=0.01)
     assert table.conicity_without_roll[1] == pytest.approx(0.1805, rel=0.01)
     assert table.pair.tolist() == ["one", "one"]
@@ -58,7 +59,7 @@ def test_conicity_of_the_pair_at_three_millimetres(s1002, uic60):
 
 def test_first_touch_of_several_pairs_keeps_them_apart(s1002, uic60):
     steep = WheelsetOnTrack.alike(s1002, named_profile("UIC60-MBench", "rail", 1 / 20))
-    table = study.touch_table({"1:40": WheelsetOnTrack.alike(s1002, uic60), "1:20": steep}, [0.003])
+    table = rigid.touch_table({"1:40": WheelsetOnTrack.alike(s1002, uic60), "1:20": steep}, [0.003])
     # 0.995 mm at 3 mm and 1:40 (rigid-geometry code); at 1:20 the conicity is some 0.0094
     assert table.set_index("pair").rolling_radius_difference_m["1:40"] == pytest.approx(0.995e-3, rel=0.01)
     assert table.set_index("pair").rolling_radius_difference_m["1:20"] == pytest.approx(2 * 0.0094 * 3e-3, rel=0.05)
@@ -69,13 +70,13 @@ def test_yawed_cone_touches_ahead_by_the_first_order_law():
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")
     geometry = WheelOnRail(wheel, rail).geometry
     yaw = 5e-3
-    table = study.location_with_yaw(geometry, [0.0], [yaw])
+    table = rigid.location_with_yaw(geometry, [0.0], [yaw])
     left = rows(table, side="left").iloc[0]
     # to first order in yaw: the next order is psi^2/2 of the axle's part
     expected = -(0.75 + left.u_wheel_m) * yaw + left.rolling_radius_m * yaw / 20
     assert left.x_m == pytest.approx(expected, rel=1e-4)
     assert left.rolling_radius_m == pytest.approx(0.46 - left.u_wheel_m / 20, abs=1e-12)
-    assert rows(study.location_with_yaw(geometry, [0.0], [0.0]), side="left").x_m.iloc[0] == 0.0
+    assert rows(rigid.location_with_yaw(geometry, [0.0], [0.0]), side="left").x_m.iloc[0] == 0.0
 
 
 # ------------------------------------------------------------------------------------------ planar against spatial
@@ -199,7 +200,7 @@ def test_of_two_patches_the_most_loaded_is_taken(benchmark_pair, monkeypatch):
     monkeypatch.setattr(study, "TOUCH", 2e4)  # at 5.1 mm tread and flange root touch under load
     poses = pd.DataFrame({"pose_id": [0], "y_m": [5.1e-3], "yaw_rad": [0.0], "roll_rad": [np.nan], "z_m": [np.nan]})
     both = loaded_poses(poses, benchmark_pair, 2e4, "maximum", detection="spatial").query("side == 'left'")
-    taken = rows(study.location_with_yaw(benchmark_pair, [5.1e-3], [0.0]), side="left")
+    taken = rows(rigid.location_with_yaw(benchmark_pair, [5.1e-3], [0.0]), side="left")
     assert len(both) == 2
     assert taken.u_wheel_m.tolist() == [both.loc[both.N_N.idxmax(), "u_wheel_m"]]
 

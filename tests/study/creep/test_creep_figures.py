@@ -6,10 +6,12 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from study.creep import figures as figures_creep
-from study.creep.figures import LAW_STYLES, binned_errors, stick_border
+from study.creep.figures import binned_errors, stick_border
 from study.creep.laws import contact_points
 from study.report.legible import save_figure
 from tests.conftest import ROOT
+from wrcore.analysis.pictures import plot_creep
+from wrcore.analysis.pictures.plot_creep import LAW_STYLES
 from wrcore.contact.rolling.ellipse import RollingContact
 
 DATA = ROOT / "tests" / "data" / "creep"
@@ -49,7 +51,7 @@ def test_laws_are_told_apart_without_colour():
 
 
 def test_curves_are_those_of_the_table(curves):
-    axes = figures_creep.fig_creep_curves(curves).axes
+    axes = plot_creep.fig_creep_curves(curves).axes
     for panel, line, along, force, factor in (
         (axes[0], "longitudinal", "xi", "fx", 1),
         (axes[2], "spin", "phi", "fy", 2),
@@ -60,7 +62,7 @@ def test_curves_are_those_of_the_table(curves):
             assert xy == pytest.approx(
                 np.stack([np.linspace(0, 0.1, 5), -(i + factor) * np.linspace(0, 0.1, 5)], axis=1)
             )
-        assert panel.get_xlabel() == figures_creep.SYMBOLS[along] and panel.get_ylabel() == figures_creep.SYMBOLS[force]
+        assert panel.get_xlabel() == plot_creep.SYMBOLS[along] and panel.get_ylabel() == plot_creep.SYMBOLS[force]
         assert line in set(curves.line)
     assert any("0.6" in text.get_text() for text in axes[3].texts)
 
@@ -164,7 +166,7 @@ def test_smoothness_draws_table_and_exact_and_says_how_much_the_pole_shows():
 
 
 def test_files_are_reproducible(curves, fields, tmp_path):
-    for draw, data in ((figures_creep.fig_creep_curves, curves), (figures_creep.fig_creep_traction, fields)):
+    for draw, data in ((plot_creep.fig_creep_curves, curves), (figures_creep.fig_creep_traction, fields)):
         for name in ("a.svg", "b.svg"):
             save_figure(draw(data), tmp_path / name)
         assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()

@@ -11,20 +11,17 @@ from study.creep.laws import (
     REFERENCE_FILES,
     ReferenceCases,
     contact_points,
-    creep_curves,
-    creep_models,
     error_table,
     exact_forces,
-    law_forces,
     laws_markdown,
     laws_table,
     read_reference,
-    table_model,
     time_models,
     timed_table,
 )
 from study.creep.smoothness import error_map, sized_creepages, smoothness, smoothness_table
 from tests.conftest import ROOT
+from wrcore.analysis.creep_curves import creep_curves, creep_models, law_forces, table_model
 from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import scales

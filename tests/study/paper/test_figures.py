@@ -7,16 +7,11 @@ import numpy as np
 import pytest
 from synthetic import hunting_run
 
-from study.paper.figures import (
-    fig1_parametrisation,
-    fig2_profiles,
-    fig3_detection,
-    fig4_lateral_position,
-    fig5_contact_points,
-)
-from study.style import LINES
+from study.paper.figures import fig1_parametrisation, fig2_profiles, fig3_detection, fig5_contact_points
 from tests.conftest import SCENES
 from wrcore.analysis.pictures import style as figures
+from wrcore.analysis.pictures.plot_motion import lateral_position
+from wrcore.analysis.pictures.style import LINES
 from wrcore.scene.description import load_scene
 
 POSE = {"y": 6.3e-3, "yaw": 0.015, "load": 1e4, "lowered": 4e-4}
@@ -41,7 +36,7 @@ def all_figures(scene):
     return {
         "fig2": fig2_profiles(scene.wheel, scene.rail),
         "fig3": fig3_detection(scene, **POSE),
-        "fig4": fig4_lateral_position({"free": runs(), "suspended": runs()}, {"free": 2.0}),
+        "fig4": lateral_position({"free": runs(), "suspended": runs()}, {"free": 2.0}),
         "fig5": fig5_contact_points(runs(), scene.wheel, scene.rail, 2.0),
     }
 
@@ -57,7 +52,7 @@ def test_every_axis_names_its_unit(scene):
 
 
 def test_fig4_draws_lateral_position_in_mm(scene):
-    axes = fig4_lateral_position({"free": runs()}).axes[0]
+    axes = lateral_position({"free": runs()}).axes[0]
     planar, spatial = axes.get_lines()
     assert np.array_equal(planar.get_ydata(), 1e3 * runs()["planar"]["wheelset"].y_m)
     assert planar.get_ydata()[0] == pytest.approx(2.0)
@@ -65,7 +60,7 @@ def test_fig4_draws_lateral_position_in_mm(scene):
 
 
 def test_fig4_marks_the_horizon_only_where_given():
-    figure = fig4_lateral_position({"free": runs(), "suspended": runs()}, {"free": 2.0})
+    figure = lateral_position({"free": runs(), "suspended": runs()}, {"free": 2.0})
     free, suspended = figure.axes
     assert [line.get_xdata()[0] for line in free.get_lines()[2:]] == [2.0]
     assert len(suspended.get_lines()) == 2
@@ -127,7 +122,7 @@ def test_fig1_shows_points_of_the_real_surfaces(scene):
 
 def test_files_are_reproducible_and_undated(tmp_path):
     for name in ("one", "two"):
-        figure = fig4_lateral_position({"free": runs()}, {"free": 2.0})
+        figure = lateral_position({"free": runs()}, {"free": 2.0})
         figures.save_figure(figure, tmp_path / name / "fig.png", tmp_path / name / "fig.svg")
     for ending in ("png", "svg"):
         one, two = (tmp_path / name / f"fig.{ending}" for name in ("one", "two"))
@@ -136,8 +131,8 @@ def test_files_are_reproducible_and_undated(tmp_path):
 
 
 def test_caller_settings_do_not_leak_in_or_out(tmp_path):
-    figures.save_figure(fig4_lateral_position({"free": runs()}), tmp_path / "one.png")
+    figures.save_figure(lateral_position({"free": runs()}), tmp_path / "one.png")
     with mpl.rc_context({"font.size": 30, "axes.facecolor": "red"}):
-        figures.save_figure(fig4_lateral_position({"free": runs()}), tmp_path / "two.png")
+        figures.save_figure(lateral_position({"free": runs()}), tmp_path / "two.png")
         assert mpl.rcParams["font.size"] == 30
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()

@@ -5,18 +5,11 @@ import pandas as pd
 import pytest
 from synthetic import hunting_run
 
-from study.paper import motion as analysis
 from study.paper import tables
-from study.paper.tables import (
-    comparison_table,
-    geometry_table,
-    horizons,
-    motion_table,
-    our_values,
-    time_runs,
-    timing_table,
-)
+from study.paper.tables import comparison_table, geometry_table, motion_table, our_values, time_runs, timing_table
 from tests.conftest import SCENES
+from wrcore.analysis import motion as analysis
+from wrcore.analysis.motion import horizons
 from wrcore.scene.description import load_scene
 
 

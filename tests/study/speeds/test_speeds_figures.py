@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.speeds.figures import HUNTING, RESPONSE, guiding_forces, lateral_motion, over_speed
+from study.speeds.figures import HUNTING, RESPONSE, over_speed
 from study.speeds.tables import speed_row
 from tests.synthetic import hunting_run
+from wrcore.analysis.pictures.plot_motion import guiding_forces, lateral_motion
 
 
 def vehicle_run(detection):

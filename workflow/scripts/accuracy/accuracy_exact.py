@@ -2,7 +2,7 @@
 
 import sys
 
-from study.accuracy.models import exact_row, exact_runs
+from wrcore.analysis.accuracy.models import exact_row, exact_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, source = snakemake.params.settings, snakemake.input.scene

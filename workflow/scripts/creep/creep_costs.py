@@ -7,7 +7,8 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the job reserves all cores, computes
 import sys  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from study.creep.laws import ReferenceCases, creep_models, read_reference, time_models
+from study.creep.laws import ReferenceCases, read_reference, time_models
+from wrcore.analysis.creep_curves import creep_models
 from wrcore.creep.table import load_table  # noqa: E402
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -3,7 +3,8 @@
 import sys
 from pathlib import Path
 
-from study.creep.laws import creep_models, error_table, read_reference
+from study.creep.laws import error_table, read_reference
+from wrcore.analysis.creep_curves import creep_models
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -2,9 +2,9 @@
 
 import sys
 
-from study.creep.figures import fig_creep_curves
-from study.creep.laws import creep_curves, creep_models
 from study.report.legible import save_figure
+from wrcore.analysis.creep_curves import creep_curves, creep_models
+from wrcore.analysis.pictures.plot_creep import fig_creep_curves
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

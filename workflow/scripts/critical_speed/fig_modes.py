@@ -4,8 +4,8 @@ import sys
 
 import pandas as pd
 
-from study.critical_speed.figures import fig_modes
 from study.report.legible import save_figure
+from wrcore.analysis.pictures.plot_response import fig_modes
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 title = f"{snakemake.wildcards.vehicle.replace('_', ' ')}, {snakemake.params.speed:g} m/s"

@@ -2,12 +2,12 @@
 
 import sys
 
-from study.paper.figures import fig4_lateral_position
-from study.paper.tables import horizons
 from study.report.legible import save_figure
+from wrcore.analysis.motion import horizons
+from wrcore.analysis.pictures.plot_motion import lateral_position
 from wrcore.run.output.files import load_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 cases = load_runs([*snakemake.input.planar, *snakemake.input.spatial, *snakemake.input.tight])
 titled = {title: cases[case] for case, title in snakemake.params.titles.items()}
-save_figure(fig4_lateral_position(titled, horizons(titled, snakemake.params.bound)), *snakemake.output)
+save_figure(lateral_position(titled, horizons(titled, snakemake.params.bound)), *snakemake.output)

@@ -3,8 +3,8 @@
 import sys
 
 from study.paper.figures import fig5_contact_points
-from study.paper.tables import horizons
 from study.report.legible import save_figure
+from wrcore.analysis.motion import horizons
 from wrcore.run.output.files import load_runs
 from wrcore.scene.description import load_scene
 

@@ -5,8 +5,8 @@ import sys
 import pandas as pd
 
 from study.report.legible import save_figure
-from study.speeds.figures import guiding_forces
 from wrcore.analysis.assessment.wheels import wheel_table
+from wrcore.analysis.pictures.plot_motion import guiding_forces
 from wrcore.run.output.files import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -3,7 +3,7 @@
 import sys
 
 from study.report.legible import save_figure
-from study.speeds.figures import lateral_motion
+from wrcore.analysis.pictures.plot_motion import lateral_motion
 from wrcore.run.output.files import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -11,99 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from study.contact.tables import first_order_law, over_contact_angle
+from wrcore.analysis.pictures.plot_contact import STYLES
 from wrcore.analysis.pictures.style import MM, styled
-from wrcore.contact.rigid.conicity import en15302_tolerance
-from wrcore.geometry.track import SIDES
-
-STYLES = (
-    {"color": "#0072B2", "linestyle": "-"},
-    {"color": "#E69F00", "linestyle": (0, (4, 2))},
-    {"color": "#009E73", "linestyle": (0, (1, 1))},
-    {"color": "#CC79A7", "linestyle": "-."},
-)
-"""Okabe-Ito colours, each with a different line style, to be distinguished in greyscale."""
-
-THIN = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
-
-
-@styled
-def fig_rolling_radius_difference(tables):
-    """Plot rolling radius difference over lateral shift, from tables of `first_touch` by label."""
-    figure, axes = _single()
-    for style, (label, table) in zip(STYLES, tables.items(), strict=False):
-        axes.plot(MM * table.y_m, MM * table.rolling_radius_difference_m, label=label, **style)
-    axes.set(xlabel="lateral shift y, to the left / mm", ylabel="rolling radius difference,\nleft less right / mm")
-    axes.legend(fontsize=8)
-    return figure
-
-
-@styled
-def fig_contact_angle(tables):
-    """Plot contact angles of both sides over lateral shift, from tables of `first_touch` by label.
-
-    Angles are rotations about x: positive on a left wheel, negative on a right wheel.
-    """
-    figure, axes = _single()
-    for style, (label, table) in zip(STYLES, tables.items(), strict=False):
-        for side, width in zip(SIDES, (1.4, 0.8), strict=True):
-            angle = MM * table[f"contact_angle_{side}_rad"]
-            axes.plot(MM * table.y_m, angle, label=f"{label}, {side}", **{**style, "linewidth": width})
-    axes.set(xlabel="lateral shift y, to the left / mm", ylabel="contact angle about x / mrad")
-    axes.legend(fontsize=8)
-    return figure
-
-
-@styled
-def fig_conicity(curves, reference=None):
-    """Plot equivalent conicity over amplitude, from `conicity_curve` by label.
-
-    A ``reference`` (amplitudes (m) and values) is drawn with the tolerance band of EN 15302.
-    """
-    figure, axes = _single()
-    if reference is not None:
-        amplitude, value = np.asarray(reference[0]), np.asarray(reference[1])
-        half = en15302_tolerance(value)
-        low = np.maximum(value - half, 0.0)
-        axes.fill_between(MM * amplitude, low, value + half, color="0.87", linewidth=0, label="tolerance, EN 15302")
-        axes.plot(MM * amplitude, value, "o", color="0.35", markersize=2.5, label="reference, EN 15302")
-    for style, (label, curve) in zip(STYLES, curves.items(), strict=False):
-        axes.plot(MM * curve.amplitude_m, curve.equivalent_conicity, label=label, **style)
-    axes.set(xlabel="amplitude / mm", ylabel="equivalent conicity", ylim=(0, None))
-    axes.legend(fontsize=8)
-    return figure
-
-
-@styled
-def fig_conicity_of_pairs(table):
-    """Plot equivalent conicity of several pairs (`conicity_table`) over amplitude, with and without roll."""
-    figure, axes = _single()
-    for style, (label, rows) in zip(STYLES, table.groupby("pair", sort=False), strict=False):
-        amplitude = MM * rows.amplitude_m
-        axes.plot(amplitude, rows.conicity_with_roll, label=label, **style)
-        axes.plot(amplitude, rows.conicity_without_roll, **{**style, **THIN})
-    axes.plot([], [], color="0.4", label="without roll (EN 15302)", **THIN)
-    axes.set(xlabel="amplitude / mm", ylabel="equivalent conicity", ylim=(0, None))
-    axes.legend(fontsize=7)
-    return figure
-
-
-@styled
-def fig_location_with_yaw(table):
-    """Plot lateral and longitudinal position of the left contact over shift and yaw (`location_with_yaw`)."""
-    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
-    across, along = figure.subplots(1, 2)
-    left = table[table.side == "left"]
-    for style, (yaw, rows) in zip(STYLES, left.groupby("yaw_rad"), strict=False):
-        label = f"yaw {MM * yaw:g} mrad"
-        across.plot(MM * rows.y_m, MM * rows.u_wheel_m, label=label, **style)
-        along.plot(MM * rows.y_m, MM * rows.x_m, label=label, **style)
-    across.set(ylabel="contact point on the wheel,\nto the field side / mm", title="(a) across")
-    along.set(ylabel="contact point ahead\nof the axle / mm", title="(b) along")
-    for axes in (across, along):
-        axes.set_xlabel("lateral shift y, to the left / mm")
-    across.legend(fontsize=7)
-    return figure
-
 
 BANDS = ((0.018, 0.140), (0.280, 0.560), (1.080, 1.240))
 """Ranges of contact angle on tread, flange root and flange, rad; S1002 on UIC60 has no contact at other angles."""
@@ -220,8 +129,3 @@ def fig_patch_forces(tables):
         axes.set_title(title, fontsize=9)
     panels[0].legend(fontsize=7)
     return figure
-
-
-def _single():
-    figure = Figure(figsize=(5.2, 3.2), layout="constrained")
-    return figure, figure.subplots()

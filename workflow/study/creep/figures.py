@@ -13,80 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
+from wrcore.analysis.pictures.plot_creep import LAW_STYLES, legend_below
 from wrcore.analysis.pictures.style import ACCENT, styled
 
 PERCENT = 100.0
 
-LAW_STYLES = {
-    "exact": {"label": "exact", "color": "#000000", "marker": "o", "linestyle": "-"},
-    "table ellipse": {"label": "table, ellipses", "color": "#0072B2", "marker": "s", "linestyle": (0, (1, 1))},
-    "table sdec": {"label": "table, five inputs", "color": "#56B4E9", "marker": "D", "linestyle": (0, (4, 2))},
-    "fastsim": {"label": "FASTSIM", "color": "#D55E00", "marker": "^", "linestyle": "-."},
-    "polach": {"label": "Polach", "color": "#009E73", "marker": "v", "linestyle": (0, (6, 1, 1, 1, 1, 1))},
-    "she": {"label": "Shen-Hedrick-Elkins", "color": "#CC79A7", "marker": "P", "linestyle": (0, (3, 1))},
-    "linear": {"label": "linear", "color": "0.55", "marker": "X", "linestyle": (0, (1, 3))},
-}
-"""Okabe-Ito colours; marker and line style distinguish the laws in greyscale."""
 
 TABLE_LABELS = {"table ellipse": -13, "table sdec": 7}  # points above the marker
 COST_LABELS = {"exact": {"label": "exact, operator ready"}}
 CONTACT_STYLE = {"CONTACT": {"color": "0.35", "marker": "o"}, "its FASTSIM": {"color": "0.35", "marker": "^"}}
 
 TRACTION_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.65, 256)))
-
-CURVES = (
-    ("longitudinal", "xi", "fx", "(a) longitudinal"),
-    ("lateral", "eta", "fy", "(b) lateral"),
-    ("spin", "phi", "fy", "(c) pure spin: lateral force"),
-    ("combined", "eta", "fy", "(d) lateral with spin: force"),
-    ("lateral", "eta", "mz", "(e) lateral: moment"),
-    ("spin", "phi", "mz", "(f) pure spin: moment"),
-)
-
-SYMBOLS = {
-    "xi": r"$\xi' = \xi\,G c^2/(\mu N)$ / 1",
-    "eta": r"$\eta' = \eta\,G c^2/(\mu N)$ / 1",
-    "phi": r"$\varphi' = \varphi\,G c^3/(\mu N)$ / 1",
-    "fx": r"$F_x/(\mu N)$ / 1",
-    "fy": r"$F_y/(\mu N)$ / 1",
-    "mz": r"$M_z/(\mu N c)$ / 1",
-}
-
-
-def _line_style(family):
-    style = {key: LAW_STYLES[family][key] for key in ("color", "linestyle")}
-    return {**style, "linewidth": 2.4 if family == "exact" else 1.3, "zorder": 2 if family == "exact" else 3}
-
-
-def _legend_below(figure, handles, columns, **kwargs):
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=8, **kwargs)
-
-
-@styled
-def fig_creep_curves(curves):
-    """Plot forces of one model of each family of laws over creepage (`study.creep.laws.creep_curves`).
-
-    Panels show pure longitudinal, pure lateral, pure spin and combined creepage.
-    """
-    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
-    for axes, (line, along, force, title) in zip(figure.subplots(2, 3).flat, CURVES, strict=True):
-        part = curves[curves["line"] == line]
-        for family in LAW_STYLES:
-            one = part[part["family"] == family]
-            axes.plot(one[along], one[force], label=LAW_STYLES[family]["label"], **_line_style(family))
-        bounded = part.loc[~part["family"].isin(["linear", "she"]), force]
-        room = 0.12 * np.ptp(bounded)
-        axes.set(xlabel=SYMBOLS[along], ylabel=SYMBOLS[force], ylim=(bounded.min() - room, bounded.max() + room))
-        axes.set_title(title, fontsize=9)
-        axes.margins(x=0)
-        if line == "combined":
-            axes.text(
-                0.97, 0.93, rf"$\varphi'$ = {part['phi'].iloc[0]:.2g}", transform=axes.transAxes, ha="right", va="top"
-            )
-    drawn = [family for family in LAW_STYLES if family in set(curves["family"])]
-    handles = [Line2D([], [], label=LAW_STYLES[family]["label"], **_line_style(family)) for family in drawn]
-    _legend_below(figure, handles, 4, handlelength=3.5)
-    return figure
 
 
 @styled
@@ -107,7 +44,7 @@ def fig_creep_traction(fields):
             [], [], color="k", marker=r"$\rightarrow$", linestyle="none", markersize=10, label="traction on the wheel"
         ),
     ]
-    _legend_below(figure, handles, 2)
+    legend_below(figure, handles, 2)
     return figure
 
 
@@ -311,7 +248,7 @@ def fig_creep_smoothness(lines, table):
     panels[1, 2].set_title(_axis_text(table), fontsize=7)
     handles = [Line2D([], [], **style) for style in OUTPUTS.values()]
     handles.append(Line2D([], [], color="0.4", marker=".", linestyle="none", label="exact solver"))
-    _legend_below(figure, handles, 4, handlelength=3)
+    legend_below(figure, handles, 4, handlelength=3)
     return figure
 
 

@@ -5,7 +5,7 @@ Units are those of `study.creep.laws`: nondimensional creepages and forces.
 
 import numpy as np
 
-from study.creep.laws import law_forces
+from wrcore.analysis.creep_curves import law_forces
 from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.creep.axes import creepages_at, scales
 from wrcore.creep.kalker import coefficients_at

@@ -2,8 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from study.style import shared_legend
-from wrcore.analysis.pictures.style import MM, styled
+from wrcore.analysis.pictures.style import MM, shared_legend, styled
 
 LOOKS = ("k-", "C0--", "C1-.", "C2:", "C3--")
 GPA = 1e-9

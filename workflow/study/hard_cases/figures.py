@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from study.style import LINES
-from wrcore.analysis.pictures.style import ACCENT, MM, styled
+from wrcore.analysis.pictures.style import ACCENT, LINES, MM, styled
 
 KILO = 1e-3
 

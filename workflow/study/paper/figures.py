@@ -8,8 +8,8 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
-from study.style import LINES, MARKERS, shared_legend
-from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.analysis.pictures.plot_motion import mark_horizon
+from wrcore.analysis.pictures.style import ACCENT, LINES, MARKERS, MM, RAIL, WHEEL, shared_legend, styled
 from wrcore.contact.hertz import contact_modulus, hertz_table
 from wrcore.contact.rigid.height_at_load import settle
 from wrcore.contact.search.detection import detect
@@ -223,32 +223,6 @@ def _mark(axes, points, detection):
 
 
 @styled
-def fig4_lateral_position(cases, horizons=None):
-    """Draw Fig. 4: lateral position over time with planar and with spatial detection.
-
-    ``cases`` contain runs by title of the panel and by detection. Prediction ``horizons`` (s, by title) are marked.
-    """
-    figure = Figure(figsize=(6.6, 0.9 + 1.6 * len(cases)), layout="constrained")
-    panels = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
-    for axes, (title, runs) in zip(panels, cases.items(), strict=True):
-        for detection, line in LINES.items():
-            axes.plot(runs[detection].t, MM * runs[detection]["wheelset"].y_m, label=detection, **line)
-        _mark_horizon(axes, (horizons or {}).get(title), max(run.t[-1] for run in runs.values()))
-        axes.set_title(title, loc="left")
-        axes.set(ylabel="y / mm", xmargin=0)
-    panels[-1].set_xlabel("time / s")
-    shared_legend(figure, panels)
-    return figure
-
-
-def _mark_horizon(axes, horizon, end):
-    """Mark the prediction horizon and shade the time after it, when neighbouring trajectories have separated."""
-    if horizon is not None and horizon < end:
-        axes.axvline(horizon, color="0.3", linewidth=0.9, linestyle="-.", label="prediction horizon")
-        axes.axvspan(horizon, end, color="0.93", linewidth=0, zorder=0)
-
-
-@styled
 def fig5_contact_points(runs, wheel, rail, horizon=None, body="wheelset"):
     """Draw Fig. 5: lateral positions of the contact points on rail and wheel, over time and on the profiles.
 
@@ -264,7 +238,7 @@ def fig5_contact_points(runs, wheel, rail, horizon=None, body="wheelset"):
                 _contact_history(over_time, on_profile, runs[detection], f"{body}/{side}", channel, curve, detection)
             nodes = _inside(curve, 600)
             on_profile.plot(MM * curve(nodes), MM * nodes, color=color, linewidth=1.0, zorder=1)
-            _mark_horizon(over_time, horizon, max(run.t[-1] for run in runs.values()))
+            mark_horizon(over_time, horizon, max(run.t[-1] for run in runs.values()))
             over_time.set_title(f"{name}, {side}", loc="left")
             over_time.set(xlabel="time / s", xmargin=0)
             on_profile.set_xlabel("f / mm")

@@ -3,21 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from study.paper.motion import _patches, difference, first_flange_contact, mirror_defect, prediction_horizon
 from wrcore.analysis.contact.poses import loaded_poses
+from wrcore.analysis.motion import zero_where_absent, difference, first_flange_contact, horizons, mirror_defect
 from wrcore.contact.search.strip import cubic_at
 from wrcore.geometry.track import SIDES
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 from wrcore.run.simulate import simulate
-
-
-def horizons(cases, bound):
-    """Return the prediction horizons (s, by case) of the ``spatial`` runs with a tighter twin (``spatial_tight``).
-
-    ``bound`` (m) is the accepted difference of the lateral positions.
-    """
-    paired = {case: runs for case, runs in cases.items() if "spatial_tight" in runs}
-    return {case: prediction_horizon(runs["spatial"], runs["spatial_tight"], bound) for case, runs in paired.items()}
 
 
 def motion_row(run, body="wheelset"):
@@ -36,7 +27,7 @@ def motion_row(run, body="wheelset"):
         "wavelength_m": run.scene["speed"] / frequency,
         "growth_per_s": growth_rate(run.t[early], y[early]),
         "amplitude_second_half_m": amplitude(y[run.t >= 0.5 * run.t[-1]]),
-        "max_normal_force_N": max(float(np.max(_patches(run[f"{body}/{side}"].N_N))) for side in SIDES),
+        "max_normal_force_N": max(float(np.max(zero_where_absent(run[f"{body}/{side}"].N_N))) for side in SIDES),
     }
 
 

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 
 from study.patch.rolling import solve_patch
 from study.patch.tables import REFERENCE, radius_differences
-from study.style import shared_legend
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.analysis.pictures.style import MM, styled
+from wrcore.analysis.pictures.style import MM, shared_legend, styled
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.rolling.library import ellipse_strips, make_library
 from wrcore.contact.search import reduction as columns

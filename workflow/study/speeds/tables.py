@@ -4,24 +4,11 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.assessment.wheels import wheel_table, wheelsets_of
-from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
-
-SMALLEST = 1e-6
-"""Amplitude below which frequency and damping of a motion are not determined, m."""
+from wrcore.analysis.motion import hunting
+from wrcore.run.motion import amplitude
 
 OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "growth_per_s", "damping_ratio"}
 """Columns that are also determined for runs that ended early."""
-
-
-def hunting(t, y):
-    """Return frequency (Hz), growth (1/s) and damping ratio of a lateral motion y (m) over t (s) after release.
-
-    The motion may decay, be steady or grow. Results are NaN if it ends before it has oscillated.
-    """
-    swinging = np.flatnonzero(np.abs(y) > SMALLEST)
-    end = swinging[-1] + 1 if swinging.size else 0
-    frequency, growth = hunting_frequency(t[:end], y[:end]), growth_rate(t[:end], y[:end])
-    return frequency, growth, -growth / np.hypot(growth, 2.0 * np.pi * frequency)
 
 
 def speed_row(run, begin=0.5, body="car_body"):

@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.accuracy import errors, models
-from study.accuracy.figures import speed_against_error
-from tests.study.accuracy.test_errors import worn_run
+from tests.analysis.accuracy.test_choices import worn_run
+from wrcore.analysis.accuracy import choices as errors
+from wrcore.analysis.accuracy import models
+from wrcore.analysis.accuracy.plot_choices import speed_against_error
 
 CHOICES = [
     errors.Choice("spatial", "moment", "table 0.01", "rk23", 1e-3),

@@ -158,7 +158,7 @@ def reference_row(scene, run, twin, until=np.inf):
     return pd.DataFrame([facts | run_errors(twin, run, until) | counters])
 
 
-def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None, twins=None):
+def run_choices(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None, twins=None):
     """Run and time every choice on a scene and compare each with the reference.
 
     Each timed pass runs all choices in turn, so that a slow moment of the machine affects all of them. Each row
@@ -166,8 +166,8 @@ def study(source, overrides, choices, reference, until=np.inf, repetitions=1, pr
     spread (maximum less minimum, over the median), real-time factor and counters. A first run with the lookup table
     of exact contact includes the time to solve its entries.
 
-    ``twins``, tight runs by model (`study.accuracy.models.twins`), add the errors of the integration relative to them.
-    ``progress`` wraps the choices of each pass.
+    ``twins``, tight runs by model (`wrcore.analysis.accuracy.models.twins`), add the errors of the integration relative
+    to them. ``progress`` wraps the choices of each pass.
     """
     scenes = {choice: load_scene(source, [*overrides, *choice.overrides()]) for choice in choices}
     rows, times = {}, {choice: [] for choice in choices}
@@ -196,7 +196,7 @@ def pareto_front(table, error="y_rms_m", cost="wall_s"):
 
 
 def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
-    """Return the cheapest choice of a table of :func:`study` for each accuracy, the maximum accepted error.
+    """Return the cheapest choice of a table of :func:`run_choices` for each accuracy, the maximum accepted error.
 
     Accuracies have the unit of the column ``error``. Accuracies that no choice reaches have no row.
     """
@@ -218,7 +218,7 @@ def recommendation_table(tables, accuracies):
 
 
 def front_table(tables, references):
-    """Return the Pareto fronts of several scenes, from tables of :func:`study` and :func:`reference_row` by title.
+    """Return the Pareto fronts of scenes, from tables of :func:`run_choices` and :func:`reference_row` by title.
 
     Columns: kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
     """

@@ -1,8 +1,9 @@
-"""Comparison of the motion in pairs of runs: flange contact, differences, and prediction horizon."""
+"""Motion of a run: flange contact and hunting; of two runs: differences, and the time up to which they agree."""
 
 import numpy as np
 
 from wrcore.geometry.track import SIDES
+from wrcore.run.motion import growth_rate, hunting_frequency
 
 FLANGE_ANGLE = 0.7
 """Minimum contact angle of flange contact, rad. For S1002 on UIC60 at 1:40 the contact jumps across this value: from
@@ -14,12 +15,12 @@ def first_flange_contact(run, body="wheelset", angle=FLANGE_ANGLE):
 
     Flange contact is a patch whose contact angle is at least ``angle`` (rad).
     """
-    steep = [np.nanmax(np.abs(_patches(run[f"{body}/{side}"].contact_angle_rad)), axis=1) >= angle for side in SIDES]
+    steep = [np.nanmax(np.abs(zero_where_absent(run[f"{body}/{side}"].contact_angle_rad)), axis=1) >= angle for side in SIDES]
     when = np.flatnonzero(np.logical_or(*steep))
     return float(run.t[when[0]]) if when.size else np.nan
 
 
-def _patches(values):
+def zero_where_absent(values):
     """Return channels of shape (n, patches) with 0 in place of NaN, so that absent patches do not affect a maximum."""
     return np.where(np.isnan(values), 0.0, values)
 
@@ -61,3 +62,27 @@ def mirror_defect(run, mirrored, until=np.inf, group="wheelset"):
     """
     t, gap = _gap(run, mirrored, "y_m", group, sign=-1.0)
     return float(np.max(gap[t <= until]))
+
+
+def horizons(cases, bound):
+    """Return the prediction horizons (s, by case) of the ``spatial`` runs with a tighter twin (``spatial_tight``).
+
+    ``bound`` (m) is the accepted difference of the lateral positions.
+    """
+    paired = {case: runs for case, runs in cases.items() if "spatial_tight" in runs}
+    return {case: prediction_horizon(runs["spatial"], runs["spatial_tight"], bound) for case, runs in paired.items()}
+
+
+SMALLEST = 1e-6
+"""Amplitude below which frequency and damping of a motion are not determined, m."""
+
+
+def hunting(t, y):
+    """Return frequency (Hz), growth (1/s) and damping ratio of a lateral motion y (m) over t (s) after release.
+
+    The motion may decay, be steady or grow. Results are NaN if it ends before it has oscillated.
+    """
+    swinging = np.flatnonzero(np.abs(y) > SMALLEST)
+    end = swinging[-1] + 1 if swinging.size else 0
+    frequency, growth = hunting_frequency(t[:end], y[:end]), growth_rate(t[:end], y[:end])
+    return frequency, growth, -growth / np.hypot(growth, 2.0 * np.pi * frequency)

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.accuracy import errors as aa
 from tests.synthetic import hunting_run
+from wrcore.analysis.accuracy import choices as aa
 from wrcore.errors import InputError
 from wrcore.scene.description import load_scene
 

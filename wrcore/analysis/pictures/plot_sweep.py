@@ -10,9 +10,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from study.style import shared_legend
 from wrcore.analysis.pictures.plot_run import PRINTED
-from wrcore.analysis.pictures.style import styled
+from wrcore.analysis.pictures.style import shared_legend, styled
 from wrcore.sweep.batch import column_unit
 
 ENDS: dict[str, dict[str, Any]] = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.accuracy.figures import MODELS, model_kind
+from wrcore.analysis.accuracy.plot_choices import MODELS, model_kind
 
 FINEST = "table 0.003"
 

@@ -6,7 +6,7 @@ error of a model is the difference of its twin from a run with exact contact.
 
 import pandas as pd
 
-from study.accuracy.errors import SHOWN, Choice, part_of, run_errors
+from wrcore.analysis.accuracy.choices import SHOWN, Choice, part_of, run_errors
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
@@ -53,7 +53,7 @@ def exact_row(finer, coarser):
 
 
 def with_model_errors(table, tight, exact=None):
-    """Add columns with the errors of the model to a table of `study.accuracy.errors.study`.
+    """Add columns with the errors of the model to a table of `wrcore.analysis.accuracy.choices.run_choices`.
 
     They compare the tight runs of `twins` with the run with exact contact up to its end; NaN without such a run.
     All choices of a model have equal values.

@@ -6,9 +6,8 @@ Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 import numpy as np
 from matplotlib.figure import Figure
 
-from study.accuracy.errors import pareto_front
-from study.style import shared_legend
-from wrcore.analysis.pictures.style import ACCENT, styled
+from wrcore.analysis.accuracy.choices import pareto_front
+from wrcore.analysis.pictures.style import ACCENT, shared_legend, styled
 
 MODELS = (
     ("spatial, fine table", "#222222", "o"),
@@ -26,7 +25,7 @@ INTEGRATION, MODEL = "#0072B2", "#E69F00"
 
 
 def model_kind(row, finest):
-    """Return the label in ``MODELS`` of a row of the study."""
+    """Return the label in ``MODELS`` of a row of `run_choices`."""
     if row["patch"] != "moment":
         return MODELS[5 if row["patch"] == "tabulated" else 6][0]
     if row["detection"] != "spatial":
@@ -43,9 +42,10 @@ def model_kind(row, finest):
 def speed_against_error(tables, finest, doubts=None, resolved=None):
     """Plot the real-time factor over the error of y, a panel per scene.
 
-    ``tables`` of :func:`study.accuracy.errors.study` are given by title. With columns of `study.accuracy.models`, the
-    marker shows the kind of model: filled at the error of the integration, open at the error of the model. Without
-    them, marks show the difference from the reference (creep ``finest``), coloured by kind of model.
+    ``tables`` of :func:`wrcore.analysis.accuracy.choices.run_choices` are given by title. With columns of
+    `wrcore.analysis.accuracy.models`, the marker shows the kind of model: filled at the error of the integration, open
+    at the error of the model. Without them, marks show the difference from the reference (creep ``finest``), coloured
+    by kind of model.
 
     Vertical lines (RMS, m) show differences between the two reference runs (``doubts``) and between the two runs with
     exact contact (``resolved``). Smaller errors, or smaller errors of models, are not resolved.
