@@ -521,7 +521,7 @@ def test_a_table_of_another_kind_is_refused(tmp_path):
 
 
 def test_figure_of_a_sweep_has_a_panel_with_units_per_key(smoke):
-    from wrcore.analysis.pictures.plot_sweep import sweep_scatter
+    from wrcore.analysis.plot_sweep import sweep_scatter
 
     keys = ["speed", "contact.detection", "rail.inclination", "contact.friction"]
     figure = sweep_scatter(smoke, keys, "amplitude_m")

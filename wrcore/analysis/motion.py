@@ -15,7 +15,8 @@ def first_flange_contact(run, body="wheelset", angle=FLANGE_ANGLE):
 
     Flange contact is a patch whose contact angle is at least ``angle`` (rad).
     """
-    steep = [np.nanmax(np.abs(zero_where_absent(run[f"{body}/{side}"].contact_angle_rad)), axis=1) >= angle for side in SIDES]
+    angles = [zero_where_absent(run[f"{body}/{side}"].contact_angle_rad) for side in SIDES]
+    steep = [np.max(np.abs(values), axis=1) >= angle for values in angles]
     when = np.flatnonzero(np.logical_or(*steep))
     return float(run.t[when[0]]) if when.size else np.nan
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.contact.poses import loaded_poses
-from wrcore.analysis.motion import zero_where_absent, difference, first_flange_contact, horizons, mirror_defect
+from wrcore.analysis.motion import difference, first_flange_contact, horizons, mirror_defect, zero_where_absent
 from wrcore.contact.search.strip import cubic_at
 from wrcore.geometry.track import SIDES
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
