@@ -58,6 +58,8 @@ from wrcore.run.start import start as start
 from wrcore.scene.description import Scene as Scene
 from wrcore.scene.description import load_scene as load_scene
 from wrcore.scene.examples import example as example
+from wrcore.signals.read import read_signal as read_signal
+from wrcore.signals.signal import Signal as Signal
 from wrcore.sweep.batch import run_sweep as run_sweep
 from wrcore.sweep.plan import load_sweep as load_sweep
 

@@ -139,7 +139,7 @@ def _check_content(file, size):
     file.visititems(lambda name, item: items.append((name, item)))
     for name, item in items:
         if isinstance(item, h5py.Dataset):
-            fault = _fault(item.id)
+            fault = dataset_fault(item.id)
             if fault:
                 raise ValueError(f"{fault}: {name}")
             stored += item.id.get_storage_size()
@@ -149,7 +149,7 @@ def _check_content(file, size):
         raise ValueError("datasets that share their storage")
 
 
-def _fault(dataset):
+def dataset_fault(dataset):
     """Return the reason why a dataset is refused, or an empty text. The storage layout is checked first."""
     made = dataset.get_create_plist()
     layout = made.get_layout()

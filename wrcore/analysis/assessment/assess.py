@@ -38,6 +38,7 @@ from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.output.derived import quotient
 from wrcore.run.output.run import Run
+from wrcore.signals.filters import low_pass
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 PERCENTILES = (0.15, 50.0, 99.85)
 WINDOW = 2.0  # window of the sliding means, m
 STEP = 0.5  # step of the sliding means, m
-CUT = 20.0  # corner frequency of the low-pass, Hz
 
 SETTLED = 0.2
 """Settling time of the low-pass, s: then its step response has an error below 1e-4; its slowest pole decays with 48
@@ -218,16 +218,6 @@ def _sizes(sections):
     outer = sections[["p0_15", "p99_85"]].abs().max(axis=1)
     outer = outer.where(sections["quantity"] != "Q", sections["p99_85"].abs())
     return outer.where(~sections["quantity"].str.endswith("_qst"), sections["p50"].abs())
-
-
-def low_pass(values, rate, cut=CUT):
-    """Filter a signal (n,) by a Butterworth low-pass of fourth order, initially steady at the first value; rates in
-    Hz."""
-    from scipy import signal
-
-    values = np.asarray(values, float)
-    filter_ = signal.butter(4, cut, fs=rate, output="sos")
-    return signal.sosfilt(filter_, values, zi=signal.sosfilt_zi(filter_) * values[0])[0]
 
 
 def sliding_mean(s, values, window=WINDOW):

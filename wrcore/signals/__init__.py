@@ -1,0 +1,1 @@
+"""Measured signals: reading of files, units, filters, resampling and alignment with a run."""
