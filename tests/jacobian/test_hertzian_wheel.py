@@ -18,6 +18,9 @@ CASES = {
     "moment": [],
     "maximum": ["contact.patch=maximum"],
     "falling friction": ["contact.friction={mu: 0.35, falling: {ratio: 0.4, decay: 0.6}}"],
+    "friction across the rail": [
+        "contact.friction={mu: 0.35, across: {angle: [0.02, 0.1, 0.6], factor: [1.0, 0.8, 0.3]}}"
+    ],
     "Polach, planar": ["contact.creep.model=polach", "contact.detection=planar"],
     "backwards": [],
 }

@@ -17,6 +17,9 @@ CASES = {
     "tread and flange": {},
     "without damping": {"contact.normal.damping.c_e": 1.0},
     "falling friction": {"contact.friction": {"mu": 0.35, "falling": {"ratio": 0.4, "decay": 0.6}}},
+    "friction across the rail": {
+        "contact.friction": {"mu": 0.35, "across": {"angle": [0.02, 0.1, 0.6], "factor": [1.0, 0.8, 0.3]}}
+    },
     "backwards": {},
 }
 

@@ -239,6 +239,7 @@ def scene_bases(names):
     locomotive = {"parameters": read_yaml(VEHICLES / "locomotive.yaml")}
     pulled = {"name": "b", "bodies": ["wheelset_1", "bogie_1"], "force": 5.0}
     table = {**TABLE, "mu": [0.3, 0.2]}
+    across = {"angle": [0.1, 0.5], "factor": [0.8, 0.3]}
     return [
         {"speed": 20.0, "wheel": {"profile": "S1002"}, "rail": {"profile": "60E1", "inclination": "1/40"}},
         {"contact": {"detection": "spatial", "patch": "maximum", "creep": {"model": "table"}}},
@@ -250,8 +251,9 @@ def scene_bases(names):
         {"contact": {"patch": "moment", "creep": {"model": "table", "planes": "ellipse", "tolerance": 0.004}}},
         {"contact": {"patch": "moment", "creep": {"model": "table", "table": names["table"]}}},
         *({"contact": {"patch": "moment", "friction": friction}} for friction in (
-            {"mu": 0.3, "falling": {"ratio": 0.4, "decay": 0.6}}, table, {"left": 0.3, "right": table},
-            {"left": table, "right": 0.2},
+            {"mu": 0.3, "falling": {"ratio": 0.4, "decay": 0.6}}, table,
+            {"mu": 0.3, "across": across}, {"mu": 0.3, "across": {"left": across, "right": across}},
+            {"left": 0.3, "right": table}, {"left": table, "right": 0.2},
             {"mu": 0.3, "falling": {"law": "laws.py:falling", "length": 5.0, "spacing": 0.01}},
             {"law": "laws.py:friction", "begin": -5.0, "length": 40.0, "spacing": 0.5})),
         {"rail": {"profile": "60E1", "inclination": "1/40", "left": {"profile": "54E1", "inclination": "1/20"},

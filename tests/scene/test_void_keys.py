@@ -20,6 +20,7 @@ TABLE = "pyproject.toml"
 """A file that stands for a creep table, which loading a scene does not read."""
 
 FALLING = "contact.friction.falling"
+ACROSS = {"angle": [0.2, 0.5], "factor": [1.0, 0.3]}
 TANGENT = {"track.path": "tangent"}
 CANTED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 600.0, "cant": 0.1}]}
 WIDENED = {"track.path": [{"tangent": 50.0}, {"transition": 60.0}, {"curve": 100.0, "radius": 200.0, "widening": 0.01}]}
@@ -36,6 +37,7 @@ CASES = [
     ("contact.normal.damping.v0", {"contact.normal.damping.c_e": 0.7}, 0.1, {"contact.normal.damping.c_e": 1.0}),
     (f"{FALLING}.decay", {f"{FALLING}.ratio": 0.7}, 0.4, {f"{FALLING}.ratio": 1.0}),
     (f"{FALLING}.ratio", {f"{FALLING}.decay": 0.4}, 0.7, {f"{FALLING}.decay": 0.0}),
+    ("contact.friction.across", {"contact.patch": "exact"}, ACROSS, {"contact.patch": "tabulated"}),
     ("contact.creep.k_A", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "linear"}),
     ("contact.creep.k_S", {"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "table"}),
     ("contact.creep.planes", {"contact.creep.model": "table"}, "sdec", {"contact.creep.model": "she"}),

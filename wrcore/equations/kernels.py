@@ -31,8 +31,9 @@ def with_wheels(model):
 
     Patches on strips also get their lookup tables and late-compiled kernels."""
     contact, of_rails = model.contact, looked_up(model)
-    if contact.geometries or of_rails[0] != of_rails[1]:
-        wheels, bare = [], without_wheels(contact)
+    if contact.geometries or of_rails[0] != of_rails[1] or len(contact.friction_across_right):
+        across = contact.friction_across, contact.friction_across_right
+        wheels, bare = [], without_wheels(contact, friction_across_right=np.zeros((0, 2)))
         for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
             strips = contact.strips._replace(looked_up=of_rails[k % 2])
             if strips.looked_up and contact.plain:
@@ -40,7 +41,8 @@ def with_wheels(model):
 
                 strips = with_pair(bare._replace(geometry=contact.plain[k], strips=strips)).strips
             geometry = with_copied_arrays(geometry) if len(model.crossing.tables) else geometry
-            wheels.append(bare._replace(geometry=geometry, strips=strips))
+            factors = across[k % 2] if len(across[1]) else across[0]
+            wheels.append(bare._replace(geometry=geometry, strips=strips, friction_across=factors))
         contact = bare._replace(wheels=np.asarray(Handles(wheels)))
     if contact.strips.strips:
         from wrcore.wheels.kernels import with_late

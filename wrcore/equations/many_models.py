@@ -46,6 +46,7 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
+        len(contact.friction_across_right) > 0,
         len(contact.surrogate.median), strips[:3], sizes, len(set(looked_up(model))), *model.controls.period,
         *map(np.shape, model.controls), model.crossing.tables.shape, model.check_rails.rows.shape,
     )  # fmt: skip

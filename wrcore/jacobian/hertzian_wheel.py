@@ -17,6 +17,7 @@ import numpy as np
 
 from wrcore.contact.creepage import creepages
 from wrcore.contact.hertz import damping_factor
+from wrcore.contact.rail_friction import friction_at, friction_slope
 from wrcore.contact.search import reduction
 from wrcore.contact.search.moved import MOVES
 from wrcore.contact.search.strip import changes_along
@@ -181,7 +182,9 @@ def patch_slopes(contact, m, row, moved, patch, difference, scratch, out):
     normal, square = shape[0, 0], shape[0, 1]
     factor = damping_factor(approach, contact.damping, contact.damping_speed)
     damped = (damping_factor(approach + SMALL, contact.damping, contact.damping_speed) / factor - 1.0) / SMALL
-    friction, fall = falling(contact, m.friction, xi, eta, speed), slope_of_falling(contact, m.friction, xi, eta, speed)
+    at_angle = friction_at(contact.friction_across, m.friction, cosine, m.side * sine)
+    steep = m.side * friction_slope(contact.friction_across, cosine, m.side * sine)
+    friction, fall = falling(contact, at_angle, xi, eta, speed), slope_of_falling(contact, at_angle, xi, eta, speed)
     forward = 1.0 if m.vx >= speed else m.vx / speed
     limit, c = friction * normal, math.sqrt(square)
     scale = contact.shear_modulus * square / limit
@@ -212,6 +215,7 @@ def patch_slopes(contact, m, row, moved, patch, difference, scratch, out):
         dsquare = deeper + shape[1, 1] * dA + shape[2, 1] * dB + 2.0 / 3.0 * damping
         dratio = shape[1, 2] * dA + shape[2, 2] * dB
         dlimit = dnormal + fall * (slow * (xi * xi + eta * eta) * d.speed + xi * d.xi + eta * d.eta)
+        dlimit += steep * (cosine * dsine - sine * dcosine)
         dscale = dsquare - dlimit
         dx1, dx2 = d.xi * scale + x1 * dscale, d.eta * scale + x2 * dscale
         dx3 = (forward * d.phi + dforward * phi) * scale * c + x3 * (dscale + 0.5 * dsquare)

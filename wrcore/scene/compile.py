@@ -98,6 +98,7 @@ def compile_scene(
             friction.ratio, friction.decay,
             geometries, plain, friction_factors=friction.factors,
             surrogate=load_surrogate() if contact["patch"] == "surrogate" else no_surrogate(),
+            friction_across=friction.across[0], friction_across_right=friction.across[1],
         ),
         elements, vehicle.joints,
         TrackModel(bool(track.tangent), track.path, track.irregularity),

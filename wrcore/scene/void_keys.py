@@ -35,6 +35,7 @@ _ELLIPSES = "contact.patch", lambda patch: patch not in REDUCTIONS, "which has c
 _FIXED = "integration.step", lambda step: step > 0.0, "which fixes the length of all steps"
 _LAW = "contact.creep.model", lambda model: model != "table", "which has no table"
 _TABLE = "contact.creep.table", lambda table: table is not None, "which has its own planes and tolerance"
+_ONE_FRICTION = "contact.patch", lambda patch: patch == "tabulated", "whose tables have one coefficient of friction"
 _LEVEL = "at which friction does not fall"
 _POLACH = "contact.creep.model", lambda model: model != "polach", "unlike polach"
 
@@ -63,6 +64,7 @@ VOID_KEYS: tuple[VoidKey, ...] = (
     VoidKey("contact.normal.damping.v0", "contact.normal.damping.c_e", lambda c_e: c_e == 1.0, "which damps nothing"),
     VoidKey("contact.friction.falling.decay", "contact.friction.falling.ratio", lambda ratio: ratio == 1.0, _LEVEL),
     VoidKey("contact.friction.falling.ratio", "contact.friction.falling.decay", lambda decay: decay == 0.0, _LEVEL),
+    VoidKey("contact.friction.across", *_ONE_FRICTION),
     *(VoidKey(f"contact.creep.{key}", *_POLACH) for key in ("k_A", "k_S")),
     VoidKey("contact.creep.planes", "contact.patch", lambda patch: patch != "moment", "unlike moment"),
     *(VoidKey(f"contact.creep.{key}", *_ELLIPSES) for key in ("table", "tolerance")),
@@ -103,7 +105,8 @@ def leave_out_void_keys(
 
 
 def _is_changed(key, changes: Iterable[str]):
-    return any(f"{key}.".startswith(f"{changed}.") for changed in changes)
+    """Whether the key itself, a key above it or one below it is among the changes."""
+    return any(f"{key}.".startswith(f"{changed}.") or changed.startswith(f"{key}.") for changed in changes)
 
 
 def _at(data, key):

@@ -29,9 +29,10 @@ import numpy as np
 
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.vector import copy_into
+from wrcore.contact.rail_friction import friction_at
 from wrcore.contact.search.reduction import COSINE, ETA, FX, FY, NORMAL, SINE, Y, Z
 from wrcore.kernels.jit import jit
-from wrcore.wheels.contact_model import COUNTERS
+from wrcore.wheels.contact_model import COUNTERS, contact_of
 from wrcore.wheels.force import press_wheels
 from wrcore.wheels.modes import BARE, ELLIPSES, PATCHES_HELD, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.wheels.motion import MOTION
@@ -237,10 +238,12 @@ def _follow_where_sliding(model, work):
     for k in range(scratch.speeds.shape[0]):
         for wheel in range(2):
             motion, load, slip, cosine, sine = work.motions[k, wheel], 0.0, 0.0, 0.0, 0.0
+            across = contact_of(contact, k, wheel).friction_across
             for patch in range(work.counts[k, wheel]):
                 row = work.patches[k, wheel, patch]
                 normal, tangential = row[NORMAL], math.hypot(row[FX], row[FY])
-                if tangential > SLIDING * motion[MOTION.friction] * normal:
+                friction = friction_at(across, motion[MOTION.friction], row[COSINE], motion[MOTION.side] * row[SINE])
+                if tangential > SLIDING * friction * normal:
                     load, slip = load + normal, slip + normal * row[ETA]
                     cosine, sine = cosine + normal * row[COSINE], sine + normal * row[SINE]
             if load > 0.0:

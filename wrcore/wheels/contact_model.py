@@ -53,6 +53,11 @@ class ContactModel(NamedTuple):
     friction_factors: np.ndarray = np.zeros(0)  # (n,): samples of a user's friction law, see `falling`
     surrogate: Surrogate = no_surrogate()
     """Trained network that replaces exact contact, if the scene has one."""
+    friction_across: np.ndarray = np.zeros((0, 2))
+    """(n, 2): factor of friction over the rail's inclination, see `wrcore.contact.rail_friction`; empty: 1 everywhere.
+    If the rails differ, the left one's."""
+    friction_across_right: np.ndarray = np.zeros((0, 2))
+    """The right rail's, if the rails differ, else empty. Empty in wheel-specific contact models."""
 
 
 def without_wheels(contact, **more):

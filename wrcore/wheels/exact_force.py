@@ -16,6 +16,7 @@ from wrcore.contact.normal.windows import BLENDING_RATIO
 from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
 from wrcore.contact.patch.model import LOAD
 from wrcore.contact.patch.solution import NOTHING, fill_row, mean_solution, roll_on_grid, roll_patch, solve_overlaps
+from wrcore.contact.rail_friction import friction_at
 from wrcore.contact.search import reduction
 from wrcore.contact.search.approach import pressed_together
 from wrcore.contact.search.detection import SPATIAL
@@ -82,6 +83,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
         work.wrench[0, k] = work.wrench[1, k] = 0.0
     if windows == 0:
         counters[ON_GRID] += 1
+        friction = friction_at(model.friction_across, friction, frame.cosine, frame.sine)
         found = roll_on_grid(model, m, pose, frame, depth, creepage, friction, out, work)
     else:
         finer = work.normal.more

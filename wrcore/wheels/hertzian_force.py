@@ -4,6 +4,7 @@ import math
 
 from wrcore.contact.creepage import creepages
 from wrcore.contact.hertz import loaded_ellipse
+from wrcore.contact.rail_friction import friction_at
 from wrcore.contact.search import reduction
 from wrcore.contact.search.strip import changes_along, lean_at, leaning, upright
 from wrcore.creep.laws import creep_force_at
@@ -47,7 +48,8 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     normal, a, b, axis_ratio, log_axis_ratio = normal_ellipse(
         model, row[reduction.PENETRATION], row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], approach
     )
-    limit = falling(model, m.friction, xi, eta, speed) * normal
+    friction = friction_at(model.friction_across, m.friction, cosine, m.side * sine)
+    limit = falling(model, friction, xi, eta, speed) * normal
     forward = 1.0 if m.vx >= speed else m.vx / speed
     square = a * b
     c = math.sqrt(square)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
 from wrcore.contact.hertz import contact_modulus, hertz_shape_at
+from wrcore.contact.rail_friction import friction_at
 from wrcore.contact.search import approach, reduction
 from wrcore.contact.search.approach import add_pressed
 from wrcore.contact.search.strip import leaning, make_pose
@@ -148,7 +149,8 @@ def describe_patch(model, m, is_spatial, lift, rows, q, filled, row, work):
     else:
         _, n, _ = _fill_patch(geometry, m, is_spatial, y, z, ez, rows, q, row, work)
     count = close_strips(work.strips, n) if n > 0 else 0
-    friction = max(m.friction, _LEAST_FRICTION)
+    inclined = friction_at(model.friction_across, m.friction, row[reduction.COSINE], row[reduction.SINE])
+    friction = max(inclined, _LEAST_FRICTION)
     shape = describe(work.strips, count, n, geometry.rolling_radius, m.ez, friction, work.network.descriptors)
     return LiftedPatch(shape, geometry.rail_distance - y + ty, ty, tz)
 
@@ -213,7 +215,8 @@ def roll_patch(model, m, pressed, slip_xi, slip_eta, outputs):
     xi, eta, phi, _ = creepages(
         m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, pressed.px, pressed.py, pressed.pz, cosine, sine, speed
     )
-    limit = falling(model, m.friction, xi, eta, speed) * pressed.load
+    friction = friction_at(model.friction_across, m.friction, cosine, sine)
+    limit = falling(model, friction, xi, eta, speed) * pressed.load
     x, y, forward = xi + slip_xi, eta + slip_eta, min(m.vx / speed, 1.0)
     f1, f2, m3, missed, c = _at_ellipse(model, pressed.log_a, pressed.log_b, limit, x, y, forward * phi)
     m3 *= forward

@@ -66,6 +66,7 @@ class WheelInRun:
             pair.geometry, "exact", resolution, contact["slip"], **contact["material"],
             detection="planar" if scene.detection == "planar" else "spatial", steps=steps,
             friction_ratio=friction.ratio, friction_decay=friction.decay, friction_factors=friction.factors,
+            friction_across=friction.across_of(list(SIDES).index(side)),
         )  # fmt: skip
         self._motions = np.column_stack([np.full(len(run.t), SIDES[side]), *(wheel[name] for name in ON_RAIL)])
         rows = (wheel[name].reshape(len(run.t), -1) for name in ("N_N", "Fy_N", "contact_angle_rad"))

@@ -136,12 +136,13 @@ class LoadedWheels:
         contact = ContactModel(
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
             REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, SLOWEST, strips,
+            **more,
         )  # fmt: skip
         if strips.strips:
-            contact = with_fallback(contact._replace(**more))
+            contact = with_fallback(contact)
         elif self.is_surrogate:
             law = {"law": LAWS["table"], "creep": _table(self.poisson_ratio)}
-            contact = contact._replace(surrogate=load_surrogate(), **law, **more)
+            contact = contact._replace(surrogate=load_surrogate(), **law)
         self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
         self._rolling = {}
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(COUNTERS, np.int64)

@@ -14,6 +14,7 @@ from wrcore.contact.grid.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.normal import solve
 from wrcore.contact.normal.gap import rigid_slip
 from wrcore.contact.normal.gap import strip_wrenches as wrenches_of_strips
+from wrcore.contact.rail_friction import friction_factor
 from wrcore.contact.rolling import rolling
 from wrcore.contact.search import reduction
 from wrcore.contact.search.strip import AHEAD, leaning, with_rail_along
@@ -132,14 +133,26 @@ def library_of(settings, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _roll(model, friction, strips, slip, force, work):
-    """Fill ``force`` (3, n) with the creep forces on the strips."""
+    """Fill ``force`` (3, n) with the creep forces on the strips. The row BOUND of ``strips`` is the maximum of the
+    traction in each strip over ``friction``, Pa."""
     count, (library, own) = work.solved[0], library_of(model.strips, work)
     rolling.rolling_force(
         strips[solve.OWN_PLACE, :count], strips[solve.OWN_WIDTH, :count], strips[solve.HALF_LENGTH, :count],
-        strips[solve.MIDDLE, :count], strips[solve.PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count],
+        strips[solve.MIDDLE, :count], strips[solve.BOUND, :count], slip[0, :count], slip[1, :count], slip[2, :count],
         slip[3, :count], model.shear_modulus, friction, library, own, rolling.AUTO,
     )  # fmt: skip
     rolling.read_forces(count, own, force)
+
+
+@jit(allocates=False)
+def _fill_bounds(table, frame, strips, count):
+    """Fill the row BOUND of ``strips`` with the maximum pressure in each strip times the factor of friction there."""
+    angle = math.atan2(frame.sine, frame.cosine)
+    for i in range(count):
+        factor = 1.0
+        if table.shape[0] > 0:
+            factor = friction_factor(table, angle + math.atan(strips[solve.STRIP_TILT, i]))
+        strips[solve.BOUND, i] = factor * strips[solve.PEAK, i]
 
 
 @jit(allocates=False)
@@ -184,6 +197,7 @@ def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, wo
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
     count = solve.publish(model.shear_modulus / (1.0 - model.poisson_ratio), work.normal, windows, strips, sums)
     load, x, s = sums[solve.LOAD], sums[solve.MEAN_X], sums[solve.MEAN_S]
+    _fill_bounds(model.friction_across, frame, strips, count)
     if settings.surfaces == 0:  # one set of creepages is the slip of a plane, where the undeformed wheel is deepest
         tilt = 0.0
         for i in range(count):

@@ -32,6 +32,13 @@ class Friction(NamedTuple):
     """(n,): samples of a user-defined law over slip velocity, equally spaced from 0."""
     least_share: float = 1.0
     """Smallest ratio of a coefficient along a rail to the same rail's largest coefficient."""
+    across: tuple[np.ndarray, np.ndarray] = (np.zeros((0, 2)), np.zeros((0, 2)))
+    """Factors over the inclination of the rail's surface (n, 2), left and right, see `wrcore.contact.rail_friction`;
+    the right one is empty if the rails are alike, both if the factor is 1 everywhere."""
+
+    def across_of(self, wheel: int) -> np.ndarray:
+        """Return the factors (n, 2) of the rail under the left (0) or the right (1) wheel."""
+        return self.across[wheel] if len(self.across[1]) else self.across[0]
 
 
 def read_friction(spec, reader):
@@ -41,6 +48,18 @@ def read_friction(spec, reader):
     called when the function is called.
     """
     spec, reader = spec if isinstance(spec, dict) else {"mu": spec}, reader.at("contact.friction")
+    across = _across(spec.get("across"), reader.at("across"))
+    along = _along({key: value for key, value in spec.items() if key != "across"}, reader)
+    return partial(_with_across, along, across)
+
+
+def _with_across(along, across):
+    """Return the `Friction` that the function ``along`` returns, with factors ``across`` the rails."""
+    return along()._replace(across=across)
+
+
+def _along(spec, reader):
+    """Return a function that returns the `Friction` of a mapping without ``across``."""
     falling = _falling(spec.get("falling"), reader.at("falling"))
     given = spec.keys() - {"falling"}
     if "law" in given and given <= {"law", "begin", "length", "spacing"}:
@@ -68,6 +87,25 @@ def _friction(tables, falling):
     largest = [float(table[:, 1].max()) for table in tables]
     shares = (float(table[:, 1].min()) / most for table, most in zip(tables, largest, strict=True))
     return Friction(max(largest), pack_schedules(tables), *falling)._replace(least_share=min(shares))
+
+
+def _across(spec, reader):
+    """Return the factors over the inclination of the rail's surface, left and right, see `Friction`."""
+    if spec is None:
+        return Friction._field_defaults["across"]
+    if spec.keys() <= set(SIDES):
+        if not spec:
+            raise reader.error("", "expected angle and factor, or left, or right, with these")
+        tables = [_factors(spec[side], reader.at(side)) if side in spec else np.array([[0.0, 1.0]]) for side in SIDES]
+        return tuple(tables)
+    if spec.keys() != {"angle", "factor"}:
+        expected = "expected angle and factor, or left and right with these"
+        raise reader.error("", f"{expected}, got {' and '.join(sorted(spec))}")
+    return _factors(spec, reader), np.zeros((0, 2))
+
+
+def _factors(spec, reader):
+    return read_schedule(spec, "factor", ("angle",), reader)[1]
 
 
 def _table(spec, reader):
