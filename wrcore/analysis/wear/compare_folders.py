@@ -1,4 +1,6 @@
-"""Compare two folders of ``wrcore evolve`` at equal distances: ``python -m study.wear.beside A B [--km 1e4 2e4]``.
+"""Compare two folders of ``wrcore evolve`` at equal distances.
+
+``python -m wrcore.analysis.wear.compare_folders A B [--km 1e4 2e4]``
 
 Prints a row per distance and folder; profiles and tables are interpolated linearly between steps. For tread and flange
 it also prints the maximum difference of the profiles and the maximum wear of the second folder.

@@ -1,4 +1,4 @@
-"""What a run waits for until its table is filled: ``python -m study.patch.filling [SCENE ...]``.
+"""What a run waits for until its table is filled: ``python -m tests.wheels.table.filling [SCENE ...]``.
 
 Each scene runs with looked-up contact on a table that knows what comes with the package and nothing else; the solver is
 compiled before. ``by lattice``: new cells from the coarsest lattice to the finest one.

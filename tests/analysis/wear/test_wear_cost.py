@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.wear.cost import cost_table
+from wrcore.analysis.wear.cost import cost_table
 
 
 def test_parts_add_up():

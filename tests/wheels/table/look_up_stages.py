@@ -1,4 +1,4 @@
-"""What a wheel costs whose contact is looked up, stage by stage: ``python -m study.patch.look_up_stages [SCENE ...]``.
+"""Time of a wheel with contact from the table, by stage: ``python -m tests.wheels.table.look_up_stages [SCENE ...]``.
 
 Microseconds a wheel, at states of a run of each of the scenes of `study.patch.look_up`, the least of many passes:
 ``search`` of overlaps; ``place`` of the lobe on the lattice; ``numbers`` looked up there; ``creep force`` from these;

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study.cost.recorded import record
-from study.cost.waiting import instructions, looks
 from tests.conftest import ELLIPTIC
+from tests.equations.waiting import instructions, looks
 from wrcore.equations.equations_of_motion import Equations, fill_many
 from wrcore.scene.description import load_scene
 

@@ -1,6 +1,6 @@
 """Examples with both patch models in turn."""
 
-from study.patch.example_costs import PATCHES, costs
+from tests.wheels.table.example_costs import PATCHES, costs
 from wrcore.wheels.table import store as pair_store
 
 

@@ -1,4 +1,4 @@
-"""What looked-up contact costs the examples: ``python -m study.patch.example_costs [EXAMPLE ...] [--passes N]``.
+"""What looked-up contact costs the examples: ``python -m tests.wheels.table.example_costs [EXAMPLE ...] [--passes N]``.
 
 Each example runs with ``moment`` and with ``tabulated`` in turn, as it stands, on the nodes that come with the package.
 Times are of the integration, ms; cells are put together anew in every run, as a first run does.

@@ -1,4 +1,4 @@
-"""How smooth looked-up contact is: ``python -m study.patch.increments [MODEL]``.
+"""How smooth looked-up contact is: ``python -m tests.wheels.table.increments [MODEL]``.
 
 A left wheel of the default pair moves across its rail in steps of 1 um, at a height that loads it with 50 kN in the
 middle of each stretch. Printed, for each stretch: the largest change from one increment to the next of N, Fx and Fy,

@@ -1,8 +1,8 @@
 """Time of one evaluation of the right-hand side by machine instruction, from random samples of the program counter.
 
-``python -m study.cost.waiting [scene]`` prints the time of consecutive stretches of the executed instructions of one
-evaluation. A processor executes several independent instructions at the same time. A stretch with few instructions per
-nanosecond is a chain in which each instruction waits for the previous instruction. This works on Linux on x86-64 only,
+``python -m tests.equations.waiting [scene]`` prints the time of consecutive stretches of the executed instructions of
+one evaluation. A processor executes several independent instructions at the same time. A stretch with few instructions
+per nanosecond is a chain in which each instruction waits for the previous instruction. This works on Linux on x86-64 only,
 where one process can trace another (ptrace).
 """
 

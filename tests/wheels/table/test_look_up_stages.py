@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.patch.look_up_stages import FORCE, SEARCH, STATES, costs, one_by_one, up_to, wheels_of
+from tests.wheels.table.look_up_stages import FORCE, SEARCH, STATES, costs, one_by_one, up_to, wheels_of
 from wrcore.wheels.contact_model import COUNTERS
 from wrcore.wheels.exact_force import strip_wrenches
 

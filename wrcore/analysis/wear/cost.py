@@ -1,4 +1,4 @@
-"""Cost of a long distance, extrapolated: ``python -m study.wear.cost config/wear/trailer_vehicle.yaml``."""
+"""Cost of a long distance, extrapolated: ``python -m wrcore.analysis.wear.cost config/wear/trailer_vehicle.yaml``."""
 
 import argparse
 import time
