@@ -25,7 +25,7 @@ CONTACT_FIGURES = tuple(
     for name in ("location", "radius_difference", "angle", "conicity", "location_with_yaw", "planar_error",
                  "force_sweep", "patch_forces")
 )  # fmt: skip
-CONTACT_RULES = {"contact_pairs", "contact_planar_error", "contact_reductions", "contact_search"}
+CONTACT_RULES = {"contact_pairs", "contact_planar_error", "contact_reductions"}
 BENCHMARK_FIGURES = ("ivp_work_precision", "ivp_constraints")
 CREEP_FIGURES = ("creep_curves", "creep_traction", "creep_cost", "creep_error_map", "creep_smoothness")
 
@@ -96,7 +96,7 @@ CHANGES = [
         "wheelset_v20: planar and spatial run",
     ),
     ({"creep": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
-    ({"contact": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
+    ({"contact": {"amplitudes": {"num": 7}}}, "Contact geometry of the pairs", "Error of planar detection"),
     ({"ivp": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
     ({"paper": {"figures": {"detection_pose": {"y": 0.006}}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
 ]
@@ -182,12 +182,6 @@ def test_creep_laws_are_compared_in_all_files_against_both_references(smoke):
     assert (table.groupby(["cases", "against"])["model"].nunique() >= 4 + len(settings["tables"])).all()
     assert len(table.groupby(["cases", "against"])) == 6
     assert (table[["force_q99", "moment_max", "us_per_case"]] > 0).all(axis=None)
-
-
-def test_contact_search_of_the_study_finds_everything(smoke):
-    table = pd.read_csv(smoke / "contact" / "search.csv")
-    assert len(table) == 4 and (table.wheels_searched > 0).all()
-    assert (table[["bad", "missed", "invented", "split"]] == 0).all(axis=None), table.to_string()
 
 
 def test_reductions_of_the_study_are_compared_in_all_cases(smoke):

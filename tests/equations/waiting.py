@@ -2,8 +2,8 @@
 
 ``python -m tests.equations.waiting [scene]`` prints the time of consecutive stretches of the executed instructions of
 one evaluation. A processor executes several independent instructions at the same time. A stretch with few instructions
-per nanosecond is a chain in which each instruction waits for the previous instruction. This works on Linux on x86-64 only,
-where one process can trace another (ptrace).
+per nanosecond is a chain in which each instruction waits for the previous instruction. This works on Linux on x86-64
+only, where one process can trace another (ptrace).
 """
 
 import ctypes

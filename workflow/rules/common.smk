@@ -283,7 +283,6 @@ CORE = {
     "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws", "analysis/creep_curves"),
     "creep_figures": sources("kernels", "creep", "contact/rolling", "study/creep", "analysis/creep_curves", "analysis/pictures/plot_creep", *STYLE),
     "geometry": sources(*LOADED, *SCENE, "analysis/motion", "study/paper/tables"),
-    "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/contact/rigid", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN, "study/creep_table"),
     "vehicle": sources(*VEHICLE, "analysis/motion", "study/speeds/sweep", "study/speeds/tables"),

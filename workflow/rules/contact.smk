@@ -64,23 +64,8 @@ rule contact_reductions:
     script: "../scripts/contact/contact_reductions.py"
 
 
-rule contact_search:
-    message: "Contact search against a dense one at random poses"
-    input:
-        core=CORE["contact_search"],
-    output:
-        shown("contact/search.csv", "search against dense search"),
-    log: "<logs>/contact_search.log"
-    benchmark: "<benchmarks>/contact_search.tsv"
-    params:
-        pair=CONTACT_PAIR,
-        settings=CONTACT["search"],
-    script: "../scripts/contact/contact_search.py"
-
-
 rule contact_study:
     input:
         rules.contact_pairs.output,
         rules.contact_planar_error.output,
         rules.contact_reductions.output,
-        rules.contact_search.output,

@@ -1,8 +1,8 @@
 """Dependence of the linear critical speed with exact contact on the step of the difference quotients.
 
 ``python -m tests.analysis.stability.difference_steps`` prints the critical speed of the suspended wheelset by patch
-model, resolution and step. Strips of finite width approximate a patch's outline, so that difference quotients of exact contact
-depend on their step. Contact from the lookup table is a smooth function.
+model, resolution and step. Strips of finite width approximate a patch's outline, so that difference quotients of exact
+contact depend on their step. Contact from the lookup table is a smooth function.
 """
 
 import numpy as np

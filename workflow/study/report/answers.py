@@ -40,12 +40,9 @@ def _paper_figures(read):
 
 
 def _contact(read):
-    search, steps = read("contact/search.csv"), read("contact/force_steps.csv")
-    largest = steps.groupby("reduction")["largest_step_N"].max()
-    wrong = int(search[["bad", "missed", "invented", "split"]].to_numpy().sum())
+    largest = read("contact/force_steps.csv").groupby("reduction")["largest_step_N"].max()
     return (
-        f"In {search['wheels_searched'].sum():,} wheels the search has {wrong} wrong answers; ".replace(",", " ")
-        + f"over a micrometre of lateral shift the force jumps by up to {1e-3 * largest['maximum']:.3g} kN with the "
+        f"Over a micrometre of lateral shift the force jumps by up to {1e-3 * largest['maximum']:.3g} kN with the "
         f"reduction to the deepest point and changes by at most {1e-3 * largest['moment']:.2g} kN with moments."
     )
 
