@@ -37,8 +37,11 @@ def things():
     pair, scene = wr.WheelsetOnTrack.alike(wheel, rail), wr.load_scene(SCENE, SHORT)
     run = wr.simulate(scene, progress=False)
     run.save("run.h5")
+    signal = wr.Signal("t_s", run.t, {"wheelset.y_m": run["wheelset"].y_m + 1e-5 * np.sin(90.0 * run.t)})
+    signal.to_pandas().to_csv("signal.csv")
     return {
         "wheel": wheel, "rail": rail, "pair": pair, "scene": scene, "run": run, "table": wr.ensure_table(),
+        "signal": signal,
         "session": wr.start(scene, contact__friction={"left": 0.3, "right": 0.3}),
         "rolling": wr.RollingContact(1.0, level=6), "patch": wr.patch(pair, load=5e4)[0],
         "assessed": wr.assess(run), "response": wr.frequency_response(scene, ["level"], ["wheelset.z_m"], [1.0, 2.0]),
@@ -62,6 +65,13 @@ def calls():
     found = {
         "assess": {**since, "standard": "EN 14363", "freight": False},
         "compare": {"a": run, "b": run},
+        "fit": {"scene": scene, "keys": {"initial.y": (0.001, 0.004)}, "signals": the["signal"], "band": (None, 50.0),
+                "noise": {"wheelset.y_m": 1e-5}, "start": {"initial.y": 0.002}, "threads": 1, "most_steps": 1,
+                "progress": False},
+        "read_signal": {"path": "signal.csv", "channels": {"wheelset.y": "wheelset.y_m"}, "axis": "t_s", "rate": 100.0,
+                        "units": {"wheelset.y": "m"}},
+        "Signal": {"axis": "t_s", "x": np.array([0.0, 0.1]), "values": {"a": np.zeros(2)}, "units": {"a": "m"},
+                   "source": "a"},
         "conicity_curve": {"pair": pair, "amplitudes": [0.003], "roll": False, "step": 1e-4},
         "contact_table": {"pair": pair, "shifts": [0.0], "yaws": [0.0], "wheel_load": 5e4, "detection": "spatial",
                           "patch": "moment"},
@@ -121,6 +131,14 @@ def calls():
         "Session.step": (the["session"].step, {"dt": 0.001, "inputs": {"friction.left": 0.3}}),
         "Session.set": (the["session"].set, {"name": "friction.left", "value": 0.2}),
         "Session.channels": (the["session"].channels, {"*": "wheelset.y_m"}),
+        "compare()": (wr.compare, {"a": run, "b": the["signal"], "band": (1.0, 50.0), "sections": 0.1,
+                                   "limits": {"y_m": {"rms": (1.0, 1.0)}}}),
+        "Signal.filtered": (the["signal"].filtered, {"band": (None, 50.0)}),
+        "Signal.resampled": (the["signal"].resampled, {"step": 0.01}),
+        "Signal.shifted": (the["signal"].shifted, {"offset": 1.0}),
+        "Signal.cut": (the["signal"].cut, {"begin": 0.1, "end": 0.3}),
+        "Signal.over_distance": (the["signal"].over_distance, {"distance": 20.0}),
+        "Signal.aligned": (the["signal"].aligned, {"run": run, "channel": "wheelset.y_m", "band": (None, 50.0)}),
         "Run.wheel_forces": (run.wheel_forces, {"wheelset": "wheelset"}),
     }  # fmt: skip
 

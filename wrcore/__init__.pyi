@@ -14,6 +14,9 @@ from wrcore.analysis.contact.contacts import contacts as contacts
 from wrcore.analysis.contact.errors_in_run import contact_errors as contact_errors
 from wrcore.analysis.contact.in_run import patch_in_run as patch_in_run
 from wrcore.analysis.contact.patch import patch as patch
+from wrcore.analysis.measured.compare_signal import SignalComparison as SignalComparison
+from wrcore.analysis.measured.fit import fit as fit
+from wrcore.analysis.measured.fit_result import Fit as Fit
 from wrcore.analysis.pictures.draw import draw as draw
 from wrcore.analysis.pictures.plot_contact import plot_pair as plot_pair
 from wrcore.analysis.pictures.plot_creep import plot_creep_force as plot_creep_force

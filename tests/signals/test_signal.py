@@ -134,7 +134,7 @@ def test_a_run_becomes_a_signal_over_its_distance():
         (lambda s: s.resampled(100.0), "expected a step above 0"),
         (lambda s: s.cut(30.0), "expected a part of 0 to 19.998"),
         (lambda s: s["z"], "no channel 'z' in this signal; it has y"),
-        (lambda s: wr.Signal("t", T, {}), "axis: expected t_s or s_m"),
+        (lambda s: wr.Signal("t", T, {}), "axis: expected one of t_s, s_m"),
         (lambda s: wr.Signal("t_s", -T, {}), "x: expected two increasing numbers"),
         (lambda s: wr.Signal("t_s", T, {"a": T[1:]}), "a: expected 10000 values"),
     ],

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.assessment.wheels import wheelsets_of
+from wrcore.analysis.measured.compare_signal import SignalComparison, compare_with_signal
 from wrcore.analysis.pictures.plot_run import COLORS, HEIGHT, WIDTH, printed, values_of
 from wrcore.analysis.pictures.style import plain, styled
 from wrcore.errors import InputError
@@ -20,6 +21,7 @@ from wrcore.run.output.channels import unit_of
 from wrcore.run.output.files import load_run
 from wrcore.run.output.run import Run
 from wrcore.run.simulation import flat
+from wrcore.signals.signal import Signal
 
 SAME_TIME = 1e-9
 """Largest difference between output times of two runs that are treated as equal, s."""
@@ -140,34 +142,69 @@ class Comparison:
         return tuple(worst[key] for key in SHOWN.items() if key in worst) or tuple(worst.values())[: len(SHOWN)]
 
 
+@overload
+def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Comparison: ...
+@overload
+def compare(
+    a: Run | str | PathLike[str],
+    b: Signal,
+    band: Sequence[float | None] | None = None,
+    sections: float | Sequence[Sequence[float]] | None = None,
+    limits: Mapping[str, Any] | None = None,
+) -> SignalComparison: ...
 @checked
-def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Comparison:
-    """Compare two runs channel by channel, to quantify the effect of a modelling choice.
+def compare(
+    a: Run | str | PathLike[str],
+    b: Run | Signal | str | PathLike[str],
+    band: Sequence[float | None] | None = None,
+    sections: float | Sequence[Sequence[float]] | None = None,
+    limits: Mapping[str, Any] | None = None,
+) -> Comparison | SignalComparison:
+    """Compare two runs channel by channel, or a run with a measured signal.
 
-    All stored or derived channels that both runs have are compared at their common output times. Channels of contacts
-    are compared patch by patch, at times at which a wheel has the same number of patches in both runs.
+    Two runs: all stored or derived channels that both have are compared at their common output times. Channels of
+    contacts are compared patch by patch, at times at which a wheel has the same number of patches in both runs.
+
+    A run and a signal: the channels that both have are resampled and filtered alike, to the larger of both steps, and
+    compared where both overlap. :meth:`wrcore.Signal.shifted` or :meth:`wrcore.Signal.aligned` aligns a signal.
 
     Parameters
     ----------
-    a, b : str, Path or Run
-        Runs, or their files.
+    a : str, Path or Run
+        Run or its file.
+    b : str, Path, Run or Signal
+        Second run or its file, or a signal of :func:`wrcore.read_signal`.
+    band : pair of float or None, optional
+        With a signal: lower and upper corner of a filter without phase shift, Hz (over distance 1/m).
+    sections : float or sequence of (begin, end), optional
+        With a signal: length of sections, or their ends, s or m. By default those of EN 14363 along the run's path: 250
+        m of straight track, 100 m or 70 m of full curves.
+    limits : mapping, optional
+        With a signal: limits of the mean and of the standard deviation of differences by quantity and statistic, such
+        as ``{"Q_N": {"maximum": (4e3, 6e3)}}``. Statistics are "maximum", "median" and "rms". wrcore has no limits.
 
     Returns
     -------
     Comparison
-        ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``: of the
-        difference b - a (the mean with its sign); ``t_max_s``: time of its maximum. ``scale``: root mean square of the
-        channel; for positions and motions their standard deviation, or the difference of the runs' means. It is the
-        largest value of both runs and all groups, for positions and motions at least 1e-9. ``relative``: rms over
+        Of two runs. ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``:
+        of the difference b - a (the mean with its sign); ``t_max_s``: time of its maximum. ``scale``: root mean square
+        of the channel; for positions and motions their standard deviation, or the difference of the runs' means. It is
+        the largest value of both runs and all groups, for positions and motions at least 1e-9. ``relative``: rms over
         scale. ``error``: root of the sum of squares of the errors that the runs state; NaN if they state none. Runs of
         :func:`wrcore.simulate_to_accuracy` state the error of y, Y or Q (rms) or wear (of the mean). Runs with a lookup
         table of contact state the largest errors of N and Q. ``compared``: fraction of the common times at which both
         have a value.
+    SignalComparison
+        Of a run and a signal. ``table`` has a row per channel. ``rms``, ``max``, ``mean``: of the difference run -
+        signal; ``scale``: standard deviation of the signal; ``relative``: standard deviation of the difference over
+        scale; ``ratio``: standard deviation of the run over scale; ``correlation``: coefficient of both.
+        ``validation``: mean and standard deviation over the sections of differences of their statistics.
 
     Raises
     ------
     InputError
-        If a file is not a run, or if the runs have less than two output times, or no channel, in common.
+        If a file is not a run, or if the runs have less than two output times, or no channel, in common. With a signal:
+        if it does not overlap the run, or has none of its channels.
 
     Examples
     --------
@@ -179,6 +216,11 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
     >>> bool(row["rms"] < 1e-6), bool(row["relative"] < 1e-3)
     (True, True)
     """
+    if isinstance(b, Signal):
+        return compare_with_signal(a if isinstance(a, Run) else load_run(a), b, band, sections, limits)
+    for name, value in (("band", band), ("sections", sections), ("limits", limits)):
+        if value is not None:
+            raise InputError("compare", name, "expected a signal of wr.read_signal beside it, got two runs")
     runs = tuple(one if isinstance(one, Run) else load_run(one) for one in (a, b))
     places = _common(*(run.t for run in runs))
     if len(places[0]) < 2:

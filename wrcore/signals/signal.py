@@ -25,6 +25,7 @@ Axis = Literal["t_s", "s_m"]
 Band = tuple[float | None, float | None]
 
 
+@checked
 @dataclass(frozen=True, repr=False, eq=False)
 class Signal:
     """Channels of a measurement over time or distance, in SI units.
@@ -61,12 +62,14 @@ class Signal:
     source: str = ""
 
     def __post_init__(self) -> None:
+        for name, part in {"x": self.x, **self.values}.items():
+            if part.dtype.kind not in "fiub":
+                raise InputError("Signal", name, "expected an array of numbers")
         object.__setattr__(self, "x", np.asarray(self.x, float))
         object.__setattr__(self, "values", {name: np.asarray(part, float) for name, part in self.values.items()})
-        object.__setattr__(self, "units", dict(self.units or {name: unit_of(name) for name in self.values}))
-        if self.axis not in AXIS_UNITS:
-            raise InputError("Signal", "axis", f"expected t_s or s_m, got {self.axis!r}")
-        if self.x.ndim != 1 or len(self.x) < 2 or not (np.diff(self.x) > 0.0).all():
+        units = {name: self.units.get(name, unit_of(name)) for name in self.values}
+        object.__setattr__(self, "units", units)
+        if self.x.ndim != 1 or len(self.x) < 2 or not (np.diff(self.x) > 0.0).all() or not np.isfinite(self.x).all():
             raise InputError("Signal", "x", "expected two increasing numbers or more")
         for name, part in self.values.items():
             if part.shape != self.x.shape:
@@ -128,6 +131,8 @@ class Signal:
     @checked
     def shifted(self, offset: float) -> Signal:
         """Return the signal with another zero of its axis; ``offset`` (s or m) is added to ``x``."""
+        if not np.isfinite(offset):
+            raise InputError("shifted", "offset", f"expected a finite number, got {offset}")
         return replace(self, x=self.x + offset)
 
     @checked
@@ -206,7 +211,7 @@ def _filtered(part, rate, corners):
 def grid_of(x: np.ndarray, step: float) -> np.ndarray:
     """Return the multiples of a step within the range of positions x."""
     slack = 1e-6
-    return step * np.arange(np.ceil(x[0] / step - slack), np.floor(x[-1] / step + slack) + 1.0)
+    return step * np.arange(int(np.ceil(x[0] / step - slack)), int(np.floor(x[-1] / step + slack)) + 1)
 
 
 def signal_of_run(run: Run, channels: Sequence[str], axis: Axis = "t_s", distance: str = "") -> Signal:

@@ -1,0 +1,1 @@
+"""Runs and measured signals: comparison, validation numbers and identification of parameters."""
