@@ -49,7 +49,7 @@ figures:
 	    if [ -e reports/figures/$${path##*/} ]; then cp $$path reports/figures/ || exit 1; fi; done
 
 tables: $(STAMP)
-	$(BIN)/python -m study.report.quoted --write results
+	$(BIN)/python -m docs.quoted --write results
 
 docs: $(DOCS_STAMP)
 	$(BIN)/python docs/build.py results/docs

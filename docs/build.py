@@ -65,7 +65,7 @@ def toctree(entries, options=()):
 
 def findings():
     """What the study found, from the reports that state it."""
-    from study.accuracy.front import front_markdown
+    from page_tables import front_markdown
 
     parts = [
         "# What the study found\n",

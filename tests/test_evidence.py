@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.report.evidence import PAGE, ROOT, page, read, source_of
+from docs.evidence import PAGE, ROOT, page, read, source_of
 
 ROWS = [row for section in read()["sections"] for row in section["rows"]]
 ABSENT = (
@@ -28,7 +28,7 @@ def test_what_is_said_to_be_reached_stands_in_a_report():
 
 
 def test_the_page_is_that_of_the_table():
-    assert PAGE.read_text("utf-8") == page(), "run: python -m study.report.evidence"
+    assert PAGE.read_text("utf-8") == page(), "run: python -m docs.evidence"
 
 
 def test_every_claim_is_complete_and_stands_once():

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from study.accuracy.front import front_markdown
+from docs.page_tables import front_markdown
 from tests.conftest import ROOT
 from wrcore.cli import parser
 from wrcore.run.accuracy import measured_front

@@ -98,7 +98,7 @@ MEANINGS = {
     "wheel; the last try is taken",
     "wall_s": "time of the integration on the clock, s",
 }
-"""Meaning of each counter of a run; ``python -m study.report.counters`` writes this table into how_runs_end.md."""
+"""Meaning of each counter of a run; ``python -m docs.counters`` writes this table into how_runs_end.md."""
 
 FLAGS = {
     "half_space": "1 where the patch is too wide for a half-space, else 0",

@@ -1,6 +1,6 @@
 """Compare numbers on pages with the study's tables from which they are quoted, or write them into the pages.
 
-``python -m study.report.quoted [FOLDER]`` prints each number of a page that differs from its table in the folder of
+``python -m docs.quoted [FOLDER]`` prints each number of a page that differs from its table in the folder of
 results (``results``), and ends with status 1 if there is one. ``--write`` writes the numbers of the tables into the
 pages instead and keeps a copy of each table in ``reports/tables/`` (`make tables`).
 
@@ -30,9 +30,9 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from study.report import page_tables
+from docs import page_tables
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[1]
 SOURCE, KEPT = ROOT / "reports/quoted.yaml", ROOT / "reports/tables"
 PACKAGE = {"accuracy/accuracy_front.csv": ROOT / "wrcore/run/accuracy_front.csv"}
 """Paths of the kept tables that are part of the package wrcore."""

@@ -1,10 +1,10 @@
 """The table of a run's counters in reports/how_runs_end.md, from `wrcore.run.checks.validity`.
 
-``python -m study.report.counters`` writes it into the page.
+``python -m docs.counters`` writes it into the page.
 """
 
-from study.report.page_tables import markdown
-from study.report.quoted import ROOT, block
+from docs.page_tables import markdown
+from docs.quoted import ROOT, block
 from wrcore.run.checks.validity import LOOK_UP_ERRORS, MEANINGS
 from wrcore.run.simulation import COUNTERS
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from study.accuracy.front import front_markdown
+from docs.page_tables import front_markdown
 
 ROWS = [
     # kind, speed, detection, patch, creep, method, rtol, errors of y and N, real-time factor

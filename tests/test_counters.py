@@ -2,7 +2,7 @@
 
 import re
 
-from study.report.counters import PAGE, counters_table
+from docs.counters import PAGE, counters_table
 from tests.conftest import ROOT
 from wrcore.run.checks.validity import LIMITS, LOOK_UP_ERRORS, MEANINGS
 from wrcore.run.simulation import COUNTERS
@@ -13,7 +13,7 @@ def test_every_counter_of_a_run_is_explained():
 
 
 def test_page_has_the_table_of_counters():
-    assert counters_table() in PAGE.read_text("utf-8"), "run: python -m study.report.counters"
+    assert counters_table() in PAGE.read_text("utf-8"), "run: python -m docs.counters"
 
 
 def test_counters_that_pages_name_exist():

@@ -4,8 +4,8 @@ import pandas as pd
 import pytest
 import yaml
 
-from study.report import quoted
-from study.report.page_tables import TABLES
+from docs import quoted
+from docs.page_tables import TABLES
 from tests.conftest import ROOT
 from wrcore.run.accuracy import measured_front
 
