@@ -65,6 +65,11 @@ def test_chainage_at_start_shifts_points_to_the_beginning_of_the_run(tmp_path):
     np.testing.assert_array_equal(moved.coefficients, plain.coefficients)
 
 
+def test_wrong_chainage_at_start_is_named_with_one_that_fits(tmp_path):
+    with pytest.raises(wr.InputError, match=r"such as 12450 instead of 13000$"):
+        simulate(SCENE, irregularity(tmp_path, 12450.0, chainage_at_start=13000.0), progress=False)
+
+
 def test_chainage_at_start_without_points_is_refused():
     changes = {"track.irregularity": {"spectrum": SPECTRUM, "chainage_at_start": 100.0}}
     with pytest.raises(wr.InputError, match=r"track.irregularity.chainage_at_start: expected points beside it"):

@@ -206,6 +206,20 @@ def test_patches_on_the_end_of_a_profile_are_flagged(short, tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.parametrize("patch", ["maximum", "moment"])
+def test_overlap_that_reaches_the_end_of_a_profile_is_flagged(short, patch):
+    wheel, rail = wr.named_profile(str(short), "wheel"), wr.named_profile("60E1", "rail", 1 / 40)
+    found = wr.contacts(wr.WheelsetOnTrack.alike(wheel, rail), 0.0, roll=[0.0, 5e-4, -5e-4], load=6e4, patch=patch)
+    assert found.profile_edge[0, :, 0].tolist() == [1.0, 1.0]  # its ellipse ends 0.5 mm before the profile, or more
+    loads = [1e4, 6e4]
+    light = wr.contacts(wr.WheelsetOnTrack.alike(wheel, rail), [0.0, 0.0], load=loads, patch="moment")
+    assert light.profile_edge[:, 0, 0].tolist() == [0.0, 1.0]
+    whole = wr.contacts(
+        wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), rail), [-0.006, 0.0, 0.006], load=6e4
+    )
+    assert not whole.profile_edge.any()
+
+
 def test_flags_of_a_pose_are_those_of_a_run(pair):
     turned = wr.contacts(pair, [0.0, 0.0, 0.00625], yaw=[0.0, 0.016, 0.0], load=5e4)
     assert turned.search_fallback.tolist() == [0.0, 1.0, 0.0]

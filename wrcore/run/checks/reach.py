@@ -115,7 +115,9 @@ def check_reach(scene: Scene, duration: float = math.inf) -> None:
         expected = f"expected {one.what} on the way of the run, {low:.6g} to {high:.6g} {one.unit}"
         expected += f", got {one.begin:.6g} to {one.end:.6g} {one.unit}"
         if one.field == POINTS and not (one.begin < high and one.end > low):
-            hint = f"track.irregularity.chainage_at_start says where in the file the run begins, such as {one.begin:g}"
+            shift = scene.data["track"]["irregularity"].get("chainage_at_start", 0.0)
+            hint = "track.irregularity.chainage_at_start says where in the file the run begins"
+            hint += f", such as {one.begin + shift:g}" + (f" instead of {shift:g}" if shift else "")
             raise InputError(scene.source, one.field, f"{expected}; {hint}")
         if one.end <= low:
             raise InputError(scene.source, one.field, expected)

@@ -140,8 +140,10 @@ def flags(contact, patches, roll, yaw):
     for k in range(patches.shape[1]) if contact.geometries else (slice(None),):
         for wheel in range(2) if contact.geometries else (slice(None),):
             geometry = contact.geometries[2 * k + wheel] if contact.geometries else contact.geometry
-            tilt = np.broadcast_to(_tilt(contact, yaw)[..., None, None], patches.shape[:-1])[:, k, wheel]
-            for name, values in _of_profiles(geometry, patches[:, k, wheel], tilt).items():
+            shape = patches.shape[:-1]
+            tilt = np.broadcast_to(_tilt(contact, yaw)[..., None, None], shape)[:, k, wheel]
+            raised = np.broadcast_to((np.tan(roll)[..., None] * [1.0, -1.0])[..., None], shape)[:, k, wheel]
+            for name, values in _of_profiles(geometry, patches[:, k, wheel], tilt, raised).items():
                 found[name][:, k, wheel] = values
     return found | {"search_fallback": offset > LARGEST_OFFSET, "both_flanges": np.all(flanges, axis=-1)}
 
@@ -150,9 +152,10 @@ def _tilt(contact, yaw):
     return np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
 
 
-def _of_profiles(geometry, patches, tilt):
+def _of_profiles(geometry, patches, tilt, raised):
     """Return flags, bool (...), by the names of `_OF_PROFILES`, of patches (..., PATCH_COLUMNS) of wheels with one
-    geometry; ``tilt`` (...) is the tangent of the yaw."""
+    geometry; ``tilt`` (...) is the tangent of the yaw, ``raised`` (...) the slope by which roll lifts the field side of
+    the wheel."""
     present = np.isfinite(patches[..., reduction.NORMAL])
     rows, out = patches[present], {}
     width = rows[:, reduction.SEMI_B]
@@ -166,13 +169,35 @@ def _of_profiles(geometry, patches, tilt):
     exceeds = (
         width * np.maximum(abs(wheel), abs(rail)) > WIDEST,
         (wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN),
-        (wheel_ends < reach) | (rail_ends < reach),
+        (wheel_ends < reach) | (rail_ends < reach) | _overlaps_at_end(geometry, rows, raised[present]),
         1.0 - sine_square + hollow * sine_square < 0.0,
     )
     for name, values in zip(_OF_PROFILES, exceeds, strict=True):
         out[name] = np.zeros(present.shape, bool)
         out[name][present] = values
     return out
+
+
+def _overlaps_at_end(geometry, rows, raised):
+    """Whether the profiles still overlap where the shorter one ends, bool (m,), for patches ``rows`` (m, PATCH_COLUMNS).
+
+    Ellipses stand for the whole overlap of the undeformed profiles. Beyond the end of a profile a part of it is
+    missing, even where the ellipse is narrower than the distance to the end.
+    """
+    u_wheel, u_rail = rows[:, reduction.U_WHEEL], rows[:, reduction.U_RAIL]
+    sides = []
+    for nodes, start, step, u in (
+        (geometry.wheel, geometry.wheel_start, geometry.wheel_step, u_wheel),
+        (geometry.rail, geometry.rail_start, geometry.rail_step, u_rail),
+    ):
+        places = start + step * np.arange(len(nodes))
+        sides.append((places, nodes[:, VALUE], u, np.interp(u, places, nodes[:, VALUE])))
+    found = np.zeros(len(rows), bool)
+    for end, nearer in ((0, np.maximum), (-1, np.minimum)):
+        way = nearer(*(places[end] - u for places, _, u, _ in sides))  # from the contact point to the nearer end
+        gap = raised * way + sum(at - np.interp(u + way, places, values) for places, values, u, at in sides)
+        found |= gap * np.cos(rows[:, reduction.ANGLE]) < rows[:, reduction.PENETRATION]
+    return found
 
 
 def look_up_errors(contact, patches):
