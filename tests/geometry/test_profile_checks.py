@@ -79,7 +79,7 @@ def test_cones_and_cylinders_are_wheels(tmp_path, slope):
     assert is_read(written(tmp_path, u, slope * u), "wheel", u, slope * u)
 
 
-@pytest.mark.parametrize("aside", [70.0, 55.0, 45.0, -60.0])
+@pytest.mark.parametrize("aside", [70.0, 55.0, 45.0, 30.0, -25.0, -60.0])
 def test_tape_circle_off_the_tread_is_refused_with_keys(tmp_path, aside):
     u, f = shapes(-67, 59)["S1002"]
     with pytest.raises(InputError, match="tape_circle, flange_back or shift says where"):

@@ -392,3 +392,12 @@ def test_conicity_beyond_the_end_of_a_profile_is_flagged(s1002, uic60, tmp_path)
     assert curve.profile_edge.any() and not curve.no_wave.any()
     whole = conicity_curve(WheelsetOnTrack.alike(s1002, uic60), AMPLITUDES)
     assert not whole.profile_edge.any() and not whole.no_wave.any()
+
+
+@pytest.mark.parametrize(("gauge", "offset", "warned"), [
+    (1.435, 0.0, False), (1.43, 0.0, False), (1.42, 0.0, True), (1.40, 0.0, True), (1.435, 0.01, True),
+])  # fmt: skip
+def test_flanges_without_play_cause_a_warning(s1002, uic60, capsys, gauge, offset, warned):
+    wheel = ProfileCurve.from_points(s1002.u + offset, s1002.f, "wheel", "moved")
+    conicity_curve(WheelsetOnTrack.alike(wheel, uic60, gauge=gauge), [1e-3])
+    assert ("conicity: no play of the flanges" in capsys.readouterr().err) == warned

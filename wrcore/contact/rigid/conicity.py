@@ -22,6 +22,7 @@ from wrcore.contact.rigid.first_touch import first_touch
 from wrcore.contact.rigid.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import LEAST, Within, checked
+from wrcore.errors.messages import warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +38,13 @@ puts 2.5, 2.6 and 2.7 mm outside the band (0.078 for 0.025). A gauge wider by 0.
 
 REACH = 0.010
 """Range of the table of dr(y) beyond the maximum amplitude, m: with different sides the centre of motion is shifted."""
+
+_FLANK = 10e-3
+"""Depth below the tape circle at which the distance between the flanks of both flanges is measured, m."""
+
+_PLAY = 5e-4
+"""Smallest difference of gauge and distance between the flanks of both flanges that causes no warning, m. Trams have
+3 mm."""
 
 _NOISE = 1e-9
 """Rolling radius difference below which it is set to 0, m: symmetric profiles with play have rounding errors."""
@@ -185,6 +193,7 @@ def conicity_curve(
     table = first_touch(pair, step * np.arange(-half, half + 1), roll)
     positions = table.y_m.to_numpy()
     y, difference = _around_centre(positions, table.rolling_radius_difference_m.to_numpy())
+    _warn_without_play(pair)
     conicity, ends = equivalent_conicity(y, difference, amplitudes)
     with np.errstate(divide="ignore"):
         wavelength = math.pi * np.sqrt(2.0 * pair.base * pair.mean_radius / conicity)
@@ -193,6 +202,21 @@ def conicity_curve(
     edge = np.isnan(ends[:, 0]) & cut
     columns |= {"y_min_m": ends[:, 0], "y_max_m": ends[:, 1], "profile_edge": edge.astype(int)}
     return pd.DataFrame(columns | {"no_wave": (np.isnan(conicity) & ~edge).astype(int)})
+
+
+def _warn_without_play(pair):
+    """Warn of a wheelset whose flanges do not fit between the rails."""
+    flanks = [_flank(one.wheel) for one in (pair.left, pair.right)]
+    apart = 2.0 * pair.half_distance + sum(flanks)
+    if apart > pair.gauge - _PLAY:
+        cause = "expected another gauge or half_distance, or profiles with u = 0 on their tape circle"
+        warn(f"conicity: no play of the flanges, {apart:.4g} m apart, in gauge {pair.gauge:g} m: {cause}")
+
+
+def _flank(wheel):
+    """Return the lateral coordinate (m) of the flank of the flange `_FLANK` below the tape circle; -inf without one."""
+    inside = (wheel.u < 0.0) & (wheel.f < float(wheel(0.0)) - _FLANK)
+    return float(wheel.u[inside].max(initial=-math.inf))
 
 
 def _around_centre(y, difference):

@@ -24,6 +24,8 @@ _TREAD = 0.35  # the tread, or a rail's running surface, is the widest part with
 _ON_TREAD = 0.5  # slope at the tape circle of a wheel; flanks have 1 and more
 _FLANGE = 4e-3  # m; smallest height of a flange beside the tread
 _CERTAIN = 12e-3  # m; a larger fall or rise beside the tread is a flange, even if stated directions differ
+_FLANK = 10e-3  # m below the tape circle, where the thickness of flanges is measured
+_FLANK_AT = -56e-3, -20e-3  # m; tape circles 55 (trams) to 76 mm from the flange back, flanges 20 to 35 mm thick
 _STRAIGHT = 3e-4  # m; treads without a flange that deviate less from a line are cones and cylinders
 _VERTICAL = 6.0  # slope of 80 degrees: flanges of wheels have 70 to 76, sides of rails 87
 _STEP = 5e-4  # m
@@ -125,6 +127,13 @@ def check_wheel(u, f, name, mends):
             else f"got a slope of {slope:.2g} there, on"
         )
         raise InputError(name, "points", f"expected u = 0 (tape circle) on the tread, {got} the flange: {mends.origin}")
+    if largest == "inner fall" and size > _CERTAIN and not mends.is_stated:
+        below = np.flatnonzero((at < 0.0) & (height < np.interp(0.0, at, height) - _FLANK))
+        low, high = _FLANK_AT
+        if below.size and not low <= at[below[-1]] <= high:
+            expected = f"expected u = 0 (tape circle) {-1e3 * high:g} to {-1e3 * low:g} mm from the flank of the flange"
+            got = f"got {-1e3 * at[below[-1]]:.3g} mm: {mends.origin}; of another wheel {mends.any_shape}"
+            raise InputError(name, "points", f"{expected}, {got}")
 
 
 def check_rail(u, f, name, mends):
