@@ -179,7 +179,7 @@ def _of_profiles(geometry, patches, tilt, raised):
 
 
 def _overlaps_at_end(geometry, rows, raised):
-    """Whether the profiles still overlap where the shorter one ends, bool (m,), for patches ``rows`` (m, PATCH_COLUMNS).
+    """Whether profiles still overlap at the end of the shorter one, bool (m,), for patches ``rows`` (m, PATCH_COLUMNS).
 
     Ellipses stand for the whole overlap of the undeformed profiles. Beyond the end of a profile a part of it is
     missing, even where the ellipse is narrower than the distance to the end.
