@@ -1,4 +1,5 @@
 # Checks of the configuration, and which sources each family of rules stands on.
+import copy
 import re
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -11,6 +12,21 @@ from wrcore.errors.checked_yaml import check, plain_tree
 from wrcore.scene.description import load_scene
 
 HERE = Path(workflow.basedir)
+
+
+def drop_null(part):
+    """Remove keys with the value null: --configfile leaves out parts of config/study.yaml by them."""
+    for key in [key for key, value in part.items() if value is None]:
+        del part[key]
+    for inner in part.values():
+        if isinstance(inner, dict):
+            drop_null(inner)
+
+
+GIVEN = copy.deepcopy(config)
+"""The configuration with its nulls, for a second call of Snakemake."""
+
+drop_null(config)
 
 
 def refuse(key, expected):
@@ -76,7 +92,7 @@ def check_config():
     for model in ("finer", "coarser"):
         for name, entry in config["accuracy"]["scenes"].items():
             if "exact" in entry:
-                more = {key: value for key, value in config["accuracy"]["exact"][model].items() if value is not None}
+                more = config["accuracy"]["exact"][model]
                 scenes[f"accuracy.exact.{model} with accuracy.scenes.{name}"] = (entry["scene"], entry["set"] | more)
     scenes["patch.cost"] = (config["patch"]["cost"]["scene"], config["patch"]["cost"]["set"])
     scenes["paper.geometry"] = (config["paper"]["geometry"]["scene"], {})

@@ -96,5 +96,5 @@ rule report_archive:
         "<results>/report.zip",
     log: "<logs>/report_archive.log"
     params:
-        config=config,
+        config=GIVEN,
     script: "../scripts/report/report_archive.py"
