@@ -132,7 +132,7 @@ def read_yaml(path):
         where, problem = f"line {mark.line + 1}" if mark else "", getattr(error, "problem", None) or error
         if mark and "\t" in "".join(text.splitlines()[mark.line : mark.line + 1]):
             problem = f"{problem}; this line has a tab, where YAML is indented by blanks"
-        raise InputError(path, where, f"expected YAML: {problem}") from None
+        raise InputError(path, where, f"expected YAML: {str(problem)[:500]}") from None  # it may quote the whole file
     if not isinstance(data, dict):
         raise InputError(path, "", f"expected a mapping of keys, got {type(data).__name__}")
     return data
