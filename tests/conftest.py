@@ -39,7 +39,7 @@ ELLIPTIC = _with_ellipses()
 matter than contact."""
 
 CHECKS = (
-    "study/", "test_workflow", "test_slurm", "test_attack", "test_fuzz", "test_bring_your_own", "test_first_result",
+    "study/", "test_workflow", "test_slurm", "attacks", "test_bring_your_own", "test_first_result",
     "test_arrays", "test_notebooks", "test_docs", "test_wheel",
 )  # fmt: skip
 """How names of files begin that have the marker ``check``: no tests of the core, but of the study, pages, the package,
@@ -49,8 +49,7 @@ FIRST = (
     "test_workflow", "equations/test_energy", "contact/patch", "contact/grid", "contact/normal", "contact/rolling",
     "analysis/contact", "creep", "bodies", "equations", "forces", "wheels", "track", "jacobian",
     "analysis/contact/test_out_of_round", "integrate", "track/test_corrugation",
-    "run", "vehicle", "balance", "contract", "sweep", "analysis", "test_api", "study", "contact", "test_attack",
-    "test_fuzz",
+    "run", "vehicle", "balance", "contract", "sweep", "analysis", "test_api", "study", "contact", "attacks",
 )  # fmt: skip
 """The same in the order in which files are tested (``--no-loadscope-reorder``; a longer name counts for itself): of two
 workers one compiles what vehicles run with, the other one what patches are solved with; files that need the same
@@ -63,6 +62,15 @@ os.environ["WRCORE_PROGRESS"] = "0"
 # A shell starts what runs in the background with Ctrl-C ignored: tests of interrupts need it as in the foreground.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leave out files of the other mark without importing them, for ``-m check`` and ``-m "not check"``."""
+    wanted = {"check": True, "not check": False}.get(config.option.markexpr)
+    if wanted is None or not collection_path.name.startswith("test_"):
+        return None
+    name = collection_path.relative_to(Path(__file__).parent).as_posix()
+    return True if name.startswith(CHECKS) != wanted else None
 
 
 def pytest_collection_modifyitems(items):

@@ -11,7 +11,7 @@ import pytest
 from synthetic import hunting_run
 
 import wrcore as wr
-from tests.attacking import same_numbers
+from tests.attacks.outcomes import same_numbers
 from tests.conftest import ELLIPTIC, SCENES
 from wrcore.errors import InputError, UnknownNameError
 

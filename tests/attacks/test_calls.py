@@ -9,7 +9,6 @@ import fractions
 import inspect
 import math
 import os
-import random
 import re
 import tempfile
 from functools import cache
@@ -18,12 +17,15 @@ from pathlib import Path
 import numba
 import numpy as np
 import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import wrcore as wr
-from tests.attacking import attack, tried
+from tests.attacks.generator import examples
+from tests.attacks.outcomes import fault_of
 from tests.conftest import ELLIPTIC
 from wrcore.creep import table
-from wrcore.creep.table import build_table
 from wrcore.errors import short
 
 SCENE = ELLIPTIC / "suspended_wheelset.yaml"
@@ -164,9 +166,8 @@ def mistakes():
     return [texts, numbers, lists, arrays, others]
 
 
-def spoiled(seed):
+def spoiled(draw):
     """A function, the arguments of a call of it with a mistake or two, and what these are."""
-    draw = random.Random(seed)
     name = draw.choice(sorted(calls()))
     function, arguments = calls()[name]
     arguments, said = dict(arguments), []
@@ -213,11 +214,11 @@ def excluded(kind, value):
     return bool(re.match(r"bool(,|$)", kind)) and not isinstance(value, bool | np.bool_)
 
 
-def wrong(seed):
+def wrong(draw):
     """What is wrong with how a call went; empty where it was refused, or nothing speaks against it."""
     os.chdir(tempfile.mkdtemp(dir="."))
     os.symlink("../run.h5", "run.h5")
-    name, function, arguments, said = spoiled(seed)
+    name, function, arguments, said = spoiled(draw)
     more = (arguments.pop("*"),) if "*" in arguments else ()
     try:
         function(*more, **arguments)
@@ -238,25 +239,25 @@ def wrong(seed):
     return f"{name}: nothing was said of {silent} in {short(said)}" if silent else ""
 
 
-def no_table(*_):
-    """In place of building a creep table of another material or tolerance: no mistake, but minutes of work."""
-    raise wr.InputError("misuse", "", "expected the table at hand")
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """Working directory of valid calls, each of which ran once; no creep table of another material is built here."""
+
+    def no_table(*_):
+        raise wr.InputError("misuse", "", "expected the table at hand")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("calls"))
+        for function, arguments in calls().values():  # loads kernels once for all cases
+            arguments = dict(arguments)
+            function(*((arguments.pop("*"),) if "*" in arguments else ()), **arguments)
+        patch.setattr(table, "build_table", no_table)
+        yield
+    things.cache_clear()
+    calls.cache_clear()
 
 
-@attack(1000)
-def misuse(count, seed):
-    """Public functions and methods with arguments of another type, shape, sign or size."""
-    home = Path.cwd()
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            for function, arguments in calls().values():  # loads kernels once for all cases
-                arguments = dict(arguments)
-                function(*((arguments.pop("*"),) if "*" in arguments else ()), **arguments)
-            table.build_table = no_table
-            return [line for case in range(count) for line in tried(f"misuse {case}", wrong, 100_000 * seed + case)]
-        finally:
-            os.chdir(home)
-            table.build_table = build_table
-            things.cache_clear()
-            calls.cache_clear()
+@examples(100)
+@given(draw=st.randoms(use_true_random=False))
+def test_call_with_a_mistake_is_refused(home, draw):
+    assert fault_of(wrong, draw) == ""
