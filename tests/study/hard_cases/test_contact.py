@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.hard_cases.cases import contacts, prepare, run
-from study.hard_cases.contact import GAP, crests, depth, drops, impacts, pose_sweeps, restitution, slow_push
+from study.hard_cases.contact import GAP, depth, drops, impacts, restitution
 from wrcore.contact.search import reduction
 
 
@@ -39,21 +39,4 @@ def test_the_depth_of_an_impact(vehicles):
 def test_an_impact_between_the_stages_of_a_step_is_not_missed(vehicles, assert_passed):
     # with the embedded estimate alone the wheelset comes back 2000 times as high as it fell from
     found, _ = drops(vehicles, "free wheelset", 1e-3, 1.0, ["planar"], ["ros34pw2", "rodas5"], [1e-4, 1e-6])
-    assert_passed(found)
-
-
-def test_wheels_leave_the_rail_where_the_crest_is_steep_and_nowhere_else(vehicles, assert_passed):
-    some = {name: vehicles[name] for name in ("suspended wheelset", "trailer vehicle")}
-    assert_passed(crests(some, 30.0, 3.0, 0.8, ["spatial"], ["tsit5"]))
-
-
-def test_sweeps_of_poses_have_no_memory(vehicles, assert_passed):
-    pair = {"wheel": "S1002", "rail": "UIC60-MBench", "inclination": 0.025, "gauge": 1.435, "rolling_radius": 0.46,
-            "half_distance": 0.75}  # fmt: skip
-    found, _ = pose_sweeps({"pair": pair}, 54546.0, 2e-6, 1e-3, 5e-4, 8e-3)
-    assert_passed(found)
-
-
-def test_a_slow_push_has_no_hysteresis(vehicles, assert_passed):
-    found, _ = slow_push(vehicles, "suspended wheelset", 60e3, [16.0, 32.0], ["spatial"], ["tsit5"])
     assert_passed(found)

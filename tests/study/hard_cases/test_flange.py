@@ -5,7 +5,7 @@ import math
 import pytest
 
 from study.hard_cases.cases import prepare
-from study.hard_cases.flange import derailments, flange_angle, nadal, nadal_limit
+from study.hard_cases.flange import flange_angle, nadal, nadal_limit
 
 
 def test_nadal_limit_of_the_s1002(vehicles):
@@ -20,9 +20,3 @@ def test_a_wheel_climbs_at_nadal_s_limit(vehicles, assert_passed):
     found, curve = nadal(vehicles, "suspended wheelset", 10.0, [0.1, 0.5], ["spatial"], 45e3, push)
     assert_passed(found)
     assert curve[0]["Y_over_Q"] > 2.0 * curve[1]["Y_over_Q"]
-
-
-def test_derailments_are_recognised(vehicles, assert_passed):
-    push = {"largest": 500e3, "rate": 200e3}
-    pushes = {"suspended wheelset": push, "trailer vehicle": push}
-    assert_passed(derailments(vehicles, [30.0], ["planar", "spatial"], ["auto"], pushes))

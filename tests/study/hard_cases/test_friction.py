@@ -1,21 +1,12 @@
 """Friction from none to very high, its jumps, creep laws at their ends."""
 
-from study.hard_cases.friction import friction_ladder, friction_step, frictionless, law_ends
+from study.hard_cases.friction import friction_ladder, law_ends
 
 
 def test_friction_from_none_to_high(vehicles, assert_passed):
     found = friction_ladder(vehicles, ["suspended wheelset"], [0.05, 0.8], ["table", "polach"], 1.0, ["spatial"])
     assert_passed(found)
     assert found[0]["outcome"] == "refused" and "contact.friction" in found[0]["reason"]
-
-
-def test_no_friction_changes_no_speed(vehicles, assert_passed):
-    assert_passed(frictionless(vehicles, "free wheelset", 1.0, ["spatial"], ["ros34pw2", "tsit5"]))
-
-
-def test_friction_may_step_along_the_track(vehicles, assert_passed):
-    names = ["free wheelset", "trailer vehicle"]
-    assert_passed(friction_step(vehicles, names, [0.3, 0.05, 0.6], 0.3, ["spatial"], ["tsit5"]))
 
 
 def test_laws_give_numbers_everywhere(vehicles, assert_passed):

@@ -7,9 +7,7 @@ from study.hard_cases import integration
 from study.hard_cases.integration import (
     amplification,
     baumgarte,
-    long_run,
     predicted_step,
-    restarts,
     stability_map,
     tolerance_ladder,
 )
@@ -61,16 +59,6 @@ def test_stiff_feedback_costs_implicit_steps_nothing(boxes, assert_passed):
     found, curve = baumgarte(boxes, "with axle boxes", [(5.0, 5.0), (1000.0, 1000.0)], 2.0, ["ros34pw2"])
     assert_passed(found)
     assert curve[1]["steps"] < 1.2 * curve[0]["steps"]
-
-
-def test_long_hunting_does_not_drift(boxes, assert_passed):
-    start = {"speed": 60.0, "initial.y": 0.0025}
-    found, _ = long_run(boxes, ["suspended wheelset"], 60.0, {"suspended wheelset": start}, 100.0, ["auto"])
-    assert_passed(found)
-
-
-def test_restarts_are_bit_identical(vehicles, assert_passed):
-    assert_passed(restarts(vehicles, ["trailer vehicle"], 0.4, 0.15, ["tsit5", "ros34pw2"], ["planar", "spatial"]))
 
 
 def test_derailing_of_rk4_at_rtol_0_1_is_a_known_limit(vehicles, assert_passed):

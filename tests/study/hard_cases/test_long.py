@@ -1,7 +1,6 @@
-"""The long run's case of the study: it passes, and it notices what it is there to notice."""
+"""The long run's case of the study notices each of its faults; that it passes is checked by the smoke workflow."""
 
 import numpy as np
-import pytest
 
 from study.hard_cases import long as analysis_hard_long
 from study.hard_cases.long import hunting
@@ -15,13 +14,6 @@ CHANGES = {"speed": 60.0, "contact.creep.model": "she", "integration.method": "r
 def checks(duration=40.0):
     found = hunting(VEHICLES, "suspended wheelset", CHANGES, duration)
     return {row["invariant"]: row for row in found}
-
-
-def test_a_limit_cycle_stays_what_it_is():
-    rows = checks(80.0)  # what joining the blocks takes is 3 % of a block's memory there, and 5 % of one half as long
-    assert len(rows) == 6 and all(row["passed"] for row in rows.values()), rows
-    first = next(iter(rows.values()))
-    assert (first["status"], first["simulated_s"], first["integrator"]) == ("completed", 80.0, "rk4")
 
 
 def test_a_bit_that_differs_is_noticed(monkeypatch):
@@ -56,15 +48,14 @@ def test_growing_memory_is_noticed(monkeypatch):
     assert not checks(10.0)["peak memory, second half over first"]["passed"]
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.01])
-def test_drift_is_noticed(monkeypatch, factor):
+def test_drift_is_noticed(monkeypatch):
     load = analysis_hard_long.load_run
 
     def drifting(path):
         run = load(path)
         channels = run.groups["wheelset"]
-        channels["y_m"] = channels["y_m"] * np.linspace(1.0, factor, len(run.t))
+        channels["y_m"] = channels["y_m"] * np.linspace(1.0, 1.01, len(run.t))
         return run
 
     monkeypatch.setattr(analysis_hard_long, "load_run", drifting)
-    assert checks()["change of the amplitude, of its own"]["passed"] == (factor == 1.0)
+    assert not checks()["change of the amplitude, of its own"]["passed"]

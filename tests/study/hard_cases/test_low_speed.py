@@ -3,15 +3,7 @@
 import numpy as np
 
 from study.hard_cases.cases import table
-from study.hard_cases.low_speed import braking, ladder, regularisation, slow_path
-
-
-def test_wheelsets_run_at_any_speed(vehicles, assert_passed):
-    assert_passed(ladder(vehicles, [1.0, 0.01, 0.001], {"ros34pw2": 0.0, "tsit5": 1.0}, 0.2))
-
-
-def test_the_path_does_not_depend_on_a_low_speed(vehicles, assert_passed):
-    assert_passed(slow_path(vehicles, "suspended wheelset", [5.0, 0.1, 0.01], 1.0, 58.0))
+from study.hard_cases.low_speed import braking, regularisation
 
 
 def test_regularisation_does_not_touch_higher_speeds(vehicles, assert_passed):

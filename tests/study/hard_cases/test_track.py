@@ -2,17 +2,12 @@
 
 import pytest
 
-from study.hard_cases.track import balance_speed, curve, irregular
+from study.hard_cases.track import balance_speed, curve
 
 
 def test_balance_speed():
     # V^2/R = g tan(asin(0.15/1.5))
     assert balance_speed(300.0, 0.15) == pytest.approx(17.199, abs=1e-3)
-
-
-def test_vehicles_stay_on_irregular_track(vehicles, assert_passed):
-    speeds = {"suspended wheelset": [60.0], "trailer vehicle": [20.0]}
-    assert_passed(irregular(vehicles, speeds, [("high", 2)], 60.0, 1.0, ["tsit5"], ["spatial"]))
 
 
 def test_curves_push_with_what_newton_asks_for(vehicles, assert_passed):
