@@ -820,31 +820,25 @@ def test_friction_that_falls_along_a_rail_errs_by_what_a_scene_says(speed, least
     assert low < np.percentile(abs(own - exact), 95) < high
 
 
-@pytest.mark.parametrize(
-    ("miss", "state", "coarse"),
-    [
+@pytest.mark.parametrize("resolution", ["coarse", "middle", "fine"])
+def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(own_cache, monkeypatch, resolution):
+    """But for what modes leave, which no lattice mends: that is told only."""
+    changes = {"contact.patch": "tabulated", "contact.resolution": resolution}
+    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), changes))
+    monkeypatch.setattr(pair_store.Pair, "_rows_of", lambda *_: np.zeros((48, NUMBERS), np.float32))
+    monkeypatch.setattr(pair_store.Pair, "_add_yaw", lambda *_: True)
+    for miss, state, coarse in (
         ((1e-3, 1e-3, 0.02, 0.2), 1, 1),
         ((4e-3, 1e-3, 0.02, 0.0), -1, 1),
         ((1e-3, 0.02, 0.02, 0.0), -1, 1),
         ((1e-3, 1e-3, 0.04, 0.0), -1, 1),
         ((0.02, 1e-3, 0.02, 0.0), -1, -1),
         ((1e-3, 0.04, 0.02, 0.0), -1, -1),
-    ],
-)
-@pytest.mark.parametrize("resolution", ["coarse", "middle", "fine"])
-def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(
-    own_cache, monkeypatch, miss, state, coarse, resolution
-):
-    """But for what modes leave, which no lattice mends: that is told only."""
-    state = coarse if resolution == "coarse" else state
-    changes = {"contact.patch": "tabulated", "contact.resolution": resolution}
-    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), changes))
-    monkeypatch.setattr(pair_store.Pair, "_rows_of", lambda *_: np.zeros((48, NUMBERS), np.float32))
-    monkeypatch.setattr(pair_store.Pair, "_add_yaw", lambda *_: True)
-    monkeypatch.setattr(pair_store.Pair, "_miss", lambda *_: miss)
-    pair, key = pair_store.Pair(model.contact, "any"), pair_cells.key_of(0, 25, 1, 7, 9, 11)
-    assert pair._solved(key)[0] == state
-    assert pair.misses[key] == miss
+    ):
+        monkeypatch.setattr(pair_store.Pair, "_miss", lambda *_, miss=miss: miss)
+        pair, key = pair_store.Pair(model.contact, "any"), pair_cells.key_of(0, 25, 1, 7, 9, 11)
+        assert pair._solved(key)[0] == (coarse if resolution == "coarse" else state), miss
+        assert pair.misses[key] == miss
 
 
 @pytest.mark.parametrize(("lattice", "peak", "state"), [(1, 0.05, -1), (2, 0.05, 1), (2, 0.12, -1), (3, 0.12, 1)])
