@@ -20,7 +20,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 # One worker per core: threads of their BLAS would wait for each other, ten times as long as they calculate.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: study test check check-cpus smoke report figures tables docs lint bench clean
+.PHONY: study test check test-check check-cpus smoke report figures tables docs lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
@@ -28,7 +28,10 @@ study: $(STAMP)
 test: $(STAMP)
 	$(PYTEST) -m "not check"
 
-check: $(STAMP) lint
+check: $(STAMP)
+	@$(MAKE) --no-print-directory -j 2 lint test-check
+
+test-check:
 	$(PYTEST) -m check
 
 check-cpus: $(STAMP)
