@@ -283,7 +283,10 @@ def sources(*rooms):
     for room in rooms:
         place = Path("workflow" if room.startswith("study/") else "wrcore") / room
         inside = [p for p in place.rglob("*") if p.suffix in (".py", ".yaml", ".csv")]
-        files += sorted(map(str, inside)) or [f"{place}.py"]
+        found = sorted(map(str, inside)) or [f"{place}.py"]
+        if not Path(found[0]).is_file():
+            raise WorkflowError(f"sources: expected a room or a module, got {room!r}")
+        files += found
     return files
 
 

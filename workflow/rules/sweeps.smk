@@ -8,7 +8,7 @@ for file in config["sweeps"]:
     except InputError as error:
         refuse("sweeps", f"{error}")
 CORE["sweeps"] = CORE["simulation"] + sources("sweep")
-CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/pictures/plot_run", "analysis.plot_sweep")
+CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/pictures/plot_run", "analysis/plot_sweep")
 
 
 wildcard_constraints:
