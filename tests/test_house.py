@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 from tests.conftest import ROOT
 
 ROOMS = (
@@ -118,38 +116,34 @@ def test_every_question_has_its_drawers():
 
 def test_tests_stand_in_the_room_that_they_test():
     tests = ROOT / "tests"
-    of_all_rooms = {Path(), Path("contract")}
+    of_all_rooms = {Path(), Path("contract"), Path("attacks")}
     folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")} - of_all_rooms
     assert {folder.parts[0] for folder in folders} == {*ROOMS, "study"}
     assert [f for f in folders if not any((ROOT / package / f).is_dir() for package in ("wrcore", "workflow"))] == []
 
 
-@pytest.mark.parametrize(
-    ("file", "line", "expected"),
-    [
-        ("run/simulation.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
-        (
-            "geometry/path.py",
-            "def f():\n    import wrcore.contact.search.scan",
-            "geometry imports wrcore.contact.search.scan",
-        ),
-        ("creep/laws.py", "from study.creep import laws", "the core imports study.creep"),
-        (
-            "kernels/jit.py",
-            "from wrcore.kernels.lanes import total",
-            "circle: wrcore.kernels.jit - wrcore.kernels.lanes",
-        ),
-        ("hallway.py", "from wrcore.hallway import x", "wrcore.hallway is no room"),
-    ],
-)
-def test_a_planted_breach_is_found(tmp_path, file, line, expected):
+PLANTED = [
+    ("run/simulation.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
+    (
+        "geometry/path.py",
+        "def f():\n    import wrcore.contact.search.scan",
+        "geometry imports wrcore.contact.search.scan",
+    ),
+    ("creep/laws.py", "from study.creep import laws", "the core imports study.creep"),
+    ("kernels/jit.py", "from wrcore.kernels.lanes import total", "circle: wrcore.kernels.jit - wrcore.kernels.lanes"),
+    ("kernels/lanes.py", "from wrcore.kernels.jit import jit", "circle: wrcore.kernels.jit - wrcore.kernels.lanes"),
+    ("hallway.py", "from wrcore.hallway import x", "wrcore.hallway is no room"),
+]
+"""File, line added to it, and the breach of the house's order that it is."""
+
+
+def test_planted_breaches_are_found(tmp_path):
     for path in (ROOT / "wrcore").rglob("*.py"):
         copy = tmp_path / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text("utf-8"))
-    if "circle" in expected:
-        lanes = tmp_path / "wrcore/kernels/lanes.py"
-        lanes.write_text(lanes.read_text() + "\nfrom wrcore.kernels.jit import jit\n")
-    with Path(tmp_path / "wrcore" / file).open("a") as target:
-        target.write("\n" + line + "\n")
-    assert any(expected in breach for breach in breaches(tmp_path)), breaches(tmp_path)
+    for file, line, _ in PLANTED:
+        with Path(tmp_path / "wrcore" / file).open("a") as target:
+            target.write("\n" + line + "\n")
+    found = breaches(tmp_path)
+    assert [expected for _, _, expected in PLANTED if not any(expected in breach for breach in found)] == [], found

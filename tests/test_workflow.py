@@ -203,7 +203,17 @@ def test_no_hard_case_of_the_study_fails_without_a_known_limit(smoke):
     table = pd.read_csv(smoke / "hard_cases" / "all.csv")
     assert {"survived", "refused"} == set(table["outcome"])
     assert len(unexplained(table)) == 0, unexplained(table).to_string()
-    assert set(table["family"]) >= {"low speed", "contact jumps", "lift-off", "flange", "profiles", "friction", "track"}
+    assert set(table["family"]) >= {
+        "low speed",
+        "contact jumps",
+        "lift-off",
+        "flange",
+        "profiles",
+        "friction",
+        "track",
+        "integration",
+        "long run",
+    }
 
 
 def test_sweep_of_the_study_has_all_its_runs(smoke):

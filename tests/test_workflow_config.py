@@ -5,9 +5,12 @@ import inspect
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 import yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import update_config
 
 from study.hard_cases.study import FAMILIES
 from tests.conftest import ROOT
@@ -16,47 +19,64 @@ from wrcore.errors.checked_yaml import _validator
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            {"hard_cases": {"families": {"track": {"curve": {"duration": "9 s"}}}}},
-            "hard_cases.families.track.curve.duration: expected duration of a run (s), got '9 s'",
-        ),
-        (
-            {"hard_cases": {"families": {"friction": {"friction_step": {"names": ["free wheelset", "cart"]}}}}},
-            "hard_cases.families.friction.friction_step.names: expected one of suspended wheelset, ",
-        ),
-        (
-            {"accuracy": {"exact": {"finer": {"contact.resolution": "finest"}}}},
-            "accuracy.exact.finer with accuracy.scenes.suspended_v20: changes: contact.resolution: expected ",
-        ),
-        (
-            {"wear": {"settings": {"distance": -1.0}}},
-            "wear.plan with wear.settings: config/wear/trailer_vehicle.yaml: distance: expected the distance run in m",
-        ),
-        (
-            {"wear": {"influences": {"variants": {"smoothing 1 mm": {"plan": {"smoothin": 1.0e-3}}}}}},
-            "wear.plan with wear.influences.variants.smoothing 1 mm: config/wear/trailer_vehicle.yaml: smoothin: ",
-        ),
-        (
-            {"contact": {"pairs": {"S1002 on UIC60, 1:40": {"wheel": "S1003"}}}},
-            "contact.pairs.S1002 on UIC60, 1:40: wheel: profile: expected a point file or one of S1002, ",
-        ),
-        (
-            {"critical_speed": {"speeds": {"start": 140.0, "stop": 20.0}}},
-            "critical_speed.speeds.stop: expected more than start, 140, got 20",
-        ),
-        ({"speeds": {"values": [20.0, 60.0, 40.0, 75.0]}}, "speeds.values: expected rising numbers"),
-        ({"cost": {"pairs": {"creep": "irregular_v60"}}}, "cost.pairs.creep: expected scenes on tangent"),
-        ({"crossings": {"scene": "config/scenes/wheelset.yaml"}}, "crossings.scene: expected a scene with "),
-        (
-            {"hard_cases": {"families": {"profiles": {"profiles": {"entries": {"noise of 10 um": {"kind": "worn"}}}}}}},
-            "hard_cases.families.profiles.profiles.entries.noise of 10 um: expected the shape ['reach', 'share']",
-        ),
-    ],
-)
-def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):
+WRONG = [
+    (
+        {"hard_cases": {"families": {"track": {"curve": {"duration": "9 s"}}}}},
+        "hard_cases.families.track.curve.duration: expected duration of a run (s), got '9 s'",
+    ),
+    (
+        {"hard_cases": {"families": {"friction": {"friction_step": {"names": ["free wheelset", "cart"]}}}}},
+        "hard_cases.families.friction.friction_step.names: expected one of suspended wheelset, ",
+    ),
+    (
+        {"accuracy": {"exact": {"finer": {"contact.resolution": "finest"}}}},
+        "accuracy.exact.finer with accuracy.scenes.suspended_v20: changes: contact.resolution: expected ",
+    ),
+    (
+        {"wear": {"settings": {"distance": -1.0}}},
+        "wear.plan with wear.settings: config/wear/trailer_vehicle.yaml: distance: expected the distance run in m",
+    ),
+    (
+        {"wear": {"influences": {"variants": {"smoothing 1 mm": {"plan": {"smoothin": 1.0e-3}}}}}},
+        "wear.plan with wear.influences.variants.smoothing 1 mm: config/wear/trailer_vehicle.yaml: smoothin: ",
+    ),
+    (
+        {"contact": {"pairs": {"S1002 on UIC60, 1:40": {"wheel": "S1003"}}}},
+        "contact.pairs.S1002 on UIC60, 1:40: wheel: profile: expected a point file or one of S1002, ",
+    ),
+    (
+        {"critical_speed": {"speeds": {"start": 140.0, "stop": 20.0}}},
+        "critical_speed.speeds.stop: expected more than start, 140, got 20",
+    ),
+    ({"speeds": {"values": [20.0, 60.0, 40.0, 75.0]}}, "speeds.values: expected rising numbers"),
+    ({"cost": {"pairs": {"creep": "irregular_v60"}}}, "cost.pairs.creep: expected scenes on tangent"),
+    ({"crossings": {"scene": "config/scenes/wheelset.yaml"}}, "crossings.scene: expected a scene with "),
+    (
+        {"hard_cases": {"families": {"profiles": {"profiles": {"entries": {"noise of 10 um": {"kind": "worn"}}}}}}},
+        "hard_cases.families.profiles.profiles.entries.noise of 10 um: expected the shape ['reach', 'share']",
+    ),
+]
+"""Changes of the configuration, and the beginning of the line that refuses each."""
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG)
+def test_wrong_configuration_is_refused_in_one_line(tmp_path, monkeypatch, change, message):
+    """By the check of the rules, without a start of Snakemake."""
+    monkeypatch.chdir(ROOT)
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(change))
+    changed = yaml.safe_load((ROOT / "config/study.yaml").read_text())
+    update_config(changed, change)
+    common, workflow = ROOT / "workflow/rules/common.smk", SimpleNamespace(basedir=ROOT)
+    workflow.overwrite_configfiles, workflow.is_main_process = [tmp_path / "wrong.yaml"], True
+    source = common.read_text().partition("check_config()\n\n")[0] + "check_config()\n"
+    with pytest.raises(WorkflowError) as caught:
+        exec(compile(source, common, "exec"), {"workflow": workflow, "config": changed})
+    said = str(caught.value)
+    assert said.startswith(f"{tmp_path}/wrong.yaml: {message}") and "\n" not in said
+
+
+def test_wrong_configuration_stops_before_any_job(tmp_path):
+    change, message = WRONG[0]
     (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(change))
     command = [sys.executable, "-m", "snakemake", "--dry-run", "--configfile", str(tmp_path / "wrong.yaml")]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
