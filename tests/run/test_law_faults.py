@@ -127,6 +127,15 @@ def test_friction_of_another_kind_of_numbers_is_refused(tmp_path, kind):
         compile_scene(wr.load_scene(SCENE, {**QUICK, "contact.friction": law}))
 
 
+def test_friction_with_masked_values_is_refused(tmp_path):
+    (tmp_path / "f.py").write_text(
+        "import numpy as np\ndef law(s):\n    return np.ma.masked_array(0.3 + 0 * s, s > 5)\n"
+    )
+    law = {"law": f"{tmp_path}/f.py:law", "length": 20.0, "spacing": 1.0}
+    with pytest.raises(InputError, match=r"contact\.friction\.law: expected numbers without masked ones"):
+        compile_scene(wr.load_scene(SCENE, {**QUICK, "contact.friction": law}))
+
+
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("array", ["parameters", "inputs", "states"])
 def test_law_that_writes_what_it_reads_is_refused(tmp_path, array, compiled):

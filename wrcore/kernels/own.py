@@ -18,6 +18,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from wrcore.errors import InputError, short
+from wrcore.errors.checked_calls import UNMASKED, is_masked
 from wrcore.errors.messages import warn
 from wrcore.kernels.aside import planned
 from wrcore.kernels.handles import Kernel, call_c
@@ -124,6 +125,8 @@ def sample(own, s, rows):
 
     If the function returns an array (n,), this array is used for all rows."""
     found = called("works on an array", own.function, s.copy())
+    if is_masked(found):
+        raise InputError("", "", UNMASKED)
     found = called("returns numbers", np.asarray, found)
     if found.dtype.kind not in "fiu":
         raise InputError("", "", f"expected real numbers, got values of type {found.dtype}")
