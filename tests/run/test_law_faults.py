@@ -128,9 +128,7 @@ def test_friction_of_another_kind_of_numbers_is_refused(tmp_path, kind):
 
 
 def test_friction_with_masked_values_is_refused(tmp_path):
-    (tmp_path / "f.py").write_text(
-        "import numpy\ndef law(s):\n    return numpy.ma.masked_greater(0.3 + 0 * s, 0.2)\n"
-    )
+    (tmp_path / "f.py").write_text("import numpy\ndef law(s):\n    return numpy.ma.masked_greater(0.3 + 0 * s, 0.2)\n")
     law = {"law": f"{tmp_path}/f.py:law", "length": 20.0, "spacing": 1.0}
     with pytest.raises(InputError, match=r"contact\.friction\.law: expected numbers without masked ones"):
         compile_scene(wr.load_scene(SCENE, {**QUICK, "contact.friction": law}))
