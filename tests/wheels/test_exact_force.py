@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from study.patch.rolling import solve_patch
 from tests.conftest import ELLIPTIC, pair_with_waves
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.analysis.contact.rolling_field import solve_patch
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.contact.normal.gap import Frame
 from wrcore.contact.patch.model import strip_model, strip_work

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from study.patch.rolling import solve_patch
 from tests.conftest import ELLIPTIC
+from wrcore.analysis.contact.rolling_field import solve_patch
 from wrcore.contact.search.reduction import (
     COSINE,
     CURVATURE_X,

@@ -301,7 +301,7 @@ CORE = {
     "creep": sources("kernels", "creep", "contact/rolling"),
     "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws", "analysis/creep_curves"),
     "creep_figures": sources("kernels", "creep", "contact/rolling", "study/creep", "analysis/creep_curves", "analysis/pictures/plot_creep", *STYLE),
-    "geometry": sources(*LOADED, *SCENE, "analysis/motion", "study/paper/tables"),
+    "geometry": sources(*LOADED, *SCENE, "analysis/motion", "analysis/contact/rigid", "study/paper/tables"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/contact/rigid", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN, "study/creep_table"),
     "vehicle": sources(*VEHICLE, "analysis/motion", "study/speeds/sweep", "study/speeds/tables"),
@@ -309,8 +309,8 @@ CORE = {
     "accuracy": sources(*VEHICLE, "analysis/accuracy"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "analysis/accuracy", "study/accuracy"),
-    "paper": sources("run", "analysis/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "analysis/motion", "analysis/pictures/plot_motion", "study/paper", "study/contact/surface"),
+    "paper": sources("run", "analysis/motion", "analysis/contact/rigid", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "analysis/motion", "analysis/pictures/plot_motion", "study/paper", "reference/surfaces"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

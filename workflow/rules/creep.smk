@@ -14,10 +14,6 @@ wildcard_constraints:
     table="|".join(CREEP_TABLES),
 
 
-def creep_table_settings(wildcards):
-    return {"nu": CREEP["nu"], **CREEP_TABLES[wildcards.table]}
-
-
 rule creep_table:
     message: "Creep table by exact rolling contact"
     input:
@@ -41,7 +37,7 @@ rule creep_study_table:
     log: "<logs>/creep_study_table/{table}.log"
     benchmark: "<benchmarks>/creep_study_table/{table}.tsv"
     params:
-        settings=creep_table_settings,
+        settings=lambda wildcards: {"nu": CREEP["nu"], **CREEP_TABLES[wildcards.table]},
     script: "../scripts/creep/creep_study_table.py"
 
 

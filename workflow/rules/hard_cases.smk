@@ -10,10 +10,6 @@ wildcard_constraints:
     family="|".join(FAMILIES),
 
 
-def hard_settings(wildcards):
-    return HARD["families"][wildcards.family]
-
-
 rule hard_cases:
     message: "Hard cases: {wildcards.family}"
     input:
@@ -27,7 +23,7 @@ rule hard_cases:
     benchmark: "<benchmarks>/hard_cases/{family}.tsv"
     params:
         vehicles=HARD["vehicles"],
-        settings=hard_settings,
+        settings=lambda wildcards: HARD["families"][wildcards.family],
     script: "../scripts/hard_cases/hard_cases.py"
 
 

@@ -1,7 +1,7 @@
 # Patch models against exact contact: one pose at a time, in runs, and exact contact against CONTACT.
 
 PATCH = config["patch"]
-CORE["patch"] = CORE["simulation"] + sources("analysis/contact/loaded", "analysis/contact/poses", *STYLE, "study/contact", "study/patch")
+CORE["patch"] = CORE["simulation"] + sources("analysis/contact/loaded", "analysis/contact/poses", "analysis/contact/rolling_field", *STYLE, "study/contact", "study/patch")
 
 
 rule patch_costs:
@@ -100,18 +100,6 @@ wildcard_constraints:
     patch="|".join(RUNS["models"]),
 
 
-def runs_scene(wildcards):
-    return CRITICAL["vehicles"][wildcards.hunter]["scene"]
-
-
-def runs_settings(wildcards):
-    return RUNS["vehicles"][wildcards.hunter]
-
-
-def runs_overrides(wildcards):
-    return changes(RUNS["models"][wildcards.patch]["set"])
-
-
 def runs_start(wildcards):
     start = RUNS["models"][wildcards.patch].get("start")
     return None if start is None else changes(start)
@@ -122,16 +110,16 @@ rule patch_runs:
     input:
         core=CORE["simulation"] + sources(*VEHICLE, "analysis/stability/stability", "analysis/stability/limit_cycles", "study/patch/runs"),
         scenes=SCENES,
-        scene=runs_scene,
+        scene=lambda wildcards: CRITICAL["vehicles"][wildcards.hunter]["scene"],
         table=rules.creep_table.output,
     output:
         "<results>/patch/runs/{hunter}_{patch}.csv",
     log: "<logs>/patch_runs/{hunter}_{patch}.log"
     benchmark: "<benchmarks>/patch_runs/{hunter}_{patch}.tsv"
     params:
-        overrides=runs_overrides,
+        overrides=lambda wildcards: changes(RUNS["models"][wildcards.patch]["set"]),
         start=runs_start,
-        settings=runs_settings,
+        settings=lambda wildcards: RUNS["vehicles"][wildcards.hunter],
     script: "../scripts/patch/patch_runs.py"
 
 

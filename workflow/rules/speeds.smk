@@ -15,17 +15,9 @@ wildcard_constraints:
     vehicle="|".join(VEHICLES),
 
 
-def vehicle_scene(wildcards):
-    return SPEEDS["vehicles"][wildcards.vehicle]["scene"]
-
-
 def vehicle_linear(wildcards):
     known = wildcards.vehicle in WITH_LINEAR
     return [f"<results>/critical_speed/{wildcards.vehicle}_linear.csv"] if known else []
-
-
-def vehicle_overrides(wildcards):
-    return changes(SPEEDS["vehicles"][wildcards.vehicle]["set"])
 
 
 rule sweep_speeds:
@@ -33,7 +25,7 @@ rule sweep_speeds:
     input:
         core=CORE["simulation"] + CORE["vehicle"],
         scenes=SCENES,
-        scene=vehicle_scene,
+        scene=lambda wildcards: SPEEDS["vehicles"][wildcards.vehicle]["scene"],
         table=rules.creep_table.output,
     output:
         speeds="<results>/speeds/{vehicle}/speeds.csv",
@@ -43,7 +35,7 @@ rule sweep_speeds:
     log: "<logs>/sweep_speeds/{vehicle}.log"
     benchmark: "<benchmarks>/sweep_speeds/{vehicle}.tsv"
     params:
-        overrides=vehicle_overrides,
+        overrides=lambda wildcards: changes(SPEEDS["vehicles"][wildcards.vehicle]["set"]),
         speeds=SPEEDS["values"],
         tracks={track: changes(entry) for track, entry in SPEEDS["tracks"].items()},
         shown=SHOWN,

@@ -20,10 +20,6 @@ def sweep_file(wildcards):
     return SWEEPS[wildcards.sweep].source
 
 
-def sweep_keys(wildcards):
-    return list(SWEEPS[wildcards.sweep].runs.columns)
-
-
 def sweep_shown(wildcards):
     measures = SWEEPS[wildcards.sweep].data["measures"]
     return "amplitude_m" if "amplitude_m" in measures else measures[0]
@@ -62,7 +58,7 @@ rule sweep_table:
         svg="<results>/sweeps/sweep_{sweep}.svg",
     log: "<logs>/sweep_table/{sweep}.log"
     params:
-        varied=sweep_keys,
+        varied=lambda wildcards: list(SWEEPS[wildcards.sweep].runs.columns),
         shown=sweep_shown,
     script: "../scripts/sweeps/sweep_table.py"
 

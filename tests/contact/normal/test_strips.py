@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.patch.rolling import solve_patch
 from tests.conftest import DATA, pair_with_waves
 from tests.contact.patch.strip_contact import RESOLUTIONS, NormalContact
+from wrcore.analysis.contact.rolling_field import solve_patch
 from wrcore.contact.grid.grid import grid_normal
 from wrcore.contact.hertz import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.normal import gap

@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from study.paper.tables import rigid_contact
 from tests.conftest import DATA
+from wrcore.analysis.contact.rigid import rigid_contact
 from wrcore.contact.rigid.conicity import conicity_curve, en15302_tolerance, equivalent_conicity
 from wrcore.contact.rigid.first_touch import first_touch
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail, WheelsetOnTrack

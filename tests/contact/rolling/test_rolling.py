@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.patch.rolling import solve_patch
+from wrcore.analysis.contact.rolling_field import solve_patch
 from wrcore.contact.rolling.ellipse import RollingContact
 from wrcore.contact.rolling.influence import _add_strip, _add_strip_exactly
 from wrcore.contact.rolling.library import ellipse_strips, make_library

@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
-from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES, pair_with_waves
 from wrcore.analysis.contact.poses import loaded_poses
+from wrcore.analysis.contact.rigid import rigid_contact as geometry_table
 from wrcore.contact.hertz import contact_modulus, hertz_table
 from wrcore.contact.rigid.height_at_load import height_at_load, settle, static_wheel_force
 from wrcore.contact.rigid.wheel_on_rail import WheelOnRail
@@ -34,6 +33,7 @@ from wrcore.errors import InputError
 from wrcore.geometry.profiles.profile import ProfileCurve
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import Track
+from wrcore.reference.surfaces import rail_surface, wheel_surface, wheelset_transform
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

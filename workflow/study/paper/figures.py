@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
-from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from wrcore.analysis.pictures.plot_motion import mark_horizon
 from wrcore.analysis.pictures.style import ACCENT, LINES, MARKERS, MM, RAIL, WHEEL, shared_legend, styled
 from wrcore.contact.hertz import contact_modulus, hertz_table
@@ -15,6 +14,7 @@ from wrcore.contact.rigid.height_at_load import settle
 from wrcore.contact.search.detection import detect
 from wrcore.contact.search.reduction import MAXIMUM
 from wrcore.geometry.track import SIDES
+from wrcore.reference.surfaces import rail_surface, wheel_surface, wheelset_transform
 
 
 def _wheel_points(scene, side, u, s, **pose):

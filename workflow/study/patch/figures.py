@@ -8,9 +8,9 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from study.patch.rolling import solve_patch
 from study.patch.tables import REFERENCE, radius_differences
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.rolling_field import solve_patch
 from wrcore.analysis.pictures.style import MM, shared_legend, styled
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.rolling.library import ellipse_strips, make_library

@@ -7,6 +7,7 @@ from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.rigid.conicity import conicity_curve
 from wrcore.contact.rigid.first_touch import first_touch
 from wrcore.contact.search.strip import cubic_at
+from wrcore.geometry.track import SIDES
 
 TOUCH = 1e-3
 """Wheel load that defines first touch, N; the penetration is below 1 nm."""
@@ -49,3 +50,39 @@ def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
 
 def _radius(geometry, u):
     return geometry.rolling_radius + cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
+
+
+RIGID_LOAD = 1e-3
+"""Wheel load at which the wheelset is regarded as rigid, N. The penetration is then below 1 nm."""
+
+
+def rigid_contact(geometry, shifts, detection="planar"):
+    """Return the table of rigid contact geometry of a wheelset at lateral positions (n,), m, without yaw.
+
+    It is the basis of conicity. Columns are y_m, roll_rad, lowering_m (of the centre below the nominal radius) and
+    radius_difference_m (left minus right). For each side's most loaded patch they are u_wheel, u_rail (m) and contact
+    angle (rad).
+    """
+    poses = pd.DataFrame(
+        {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
+    )
+    touching = loaded_poses(poses, geometry, RIGID_LOAD, "maximum", detection=detection)
+    patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
+    table = pd.DataFrame({"y_m": shifts})
+    for side in SIDES:
+        rows = patches.xs(side, level="side").reindex(range(len(shifts)))
+        for name in ("u_wheel_m", "u_rail_m", "contact_angle_rad"):
+            table[f"{side}_{name}"] = rows[name].to_numpy()
+    table.insert(1, "roll_rad", rows["roll_rad"].to_numpy())
+    table.insert(2, "lowering_m", geometry.rolling_radius - rows["z_wheelset_m"].to_numpy())
+    left, right = (
+        np.array(
+            [
+                cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
+                for u in table[f"{side}_u_wheel_m"]
+            ]
+        )
+        for side in SIDES
+    )
+    table.insert(3, "radius_difference_m", left - right)
+    return table

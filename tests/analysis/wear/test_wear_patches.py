@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from study.wear.patches import WAYS, WIDTH, U, depths, figure_of
+from tests.analysis.wear.patches import WAYS, WIDTH, U, depths, figure_of
 from wrcore.analysis.wear.local_wear import WheelWear
 
 

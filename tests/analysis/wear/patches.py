@@ -1,4 +1,4 @@
-"""Errors of ellipses in local wear: ``python -m study.wear.patches FOLDER [PLAN] [--resolution middle]``.
+"""Errors of ellipses in local wear: ``python -m tests.analysis.wear.patches FOLDER [PLAN] [--resolution middle]``.
 
 Each scene of a plan (config/wear/main_line.yaml) runs on its new wheels, once with contact from the lookup table
 (``tabulated``) and once with ellipses (``moment``). Wear of the first wheelset's wheels is computed in three ways

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from study.contact.surface import rail_surface
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import centreline, rail_direction, track_frame
 from wrcore.geometry.profiles.profile import GAUGE_DEPTH
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES, Track, build_track
+from wrcore.reference.surfaces import rail_surface
 
 CURVE = [
     {"tangent": 50.0},
@@ -36,8 +36,8 @@ def test_tangent_track_gives_the_extruded_profile_bit_by_bit(uic60, side, monkey
     def forbidden(*arguments):
         raise AssertionError("code of curved tracks ran on a tangent track")
 
-    monkeypatch.setattr("study.contact.surface.track_frame", forbidden)
-    monkeypatch.setattr("study.contact.surface.irregularity_at", forbidden)
+    monkeypatch.setattr("wrcore.reference.surfaces.track_frame", forbidden)
+    monkeypatch.setattr("wrcore.reference.surfaces.irregularity_at", forbidden)
     u, x = np.linspace(-0.03, 0.025, 7), np.linspace(-2.0, 5.0, 4)[:, None]
     points = rail_surface(uic60, Track(1.435), side, u, x)
     assert points.shape == (4, 7, 3)
