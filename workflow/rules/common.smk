@@ -58,11 +58,8 @@ def check_config():
     except InputError as error:
         refuse(error.field, error.expected)
     for key, names, place in chosen_names():
-        known = config
-        for part in place.split("."):
-            known = known[part]
         for name in names:
-            if name not in known:
+            if name not in (known := setting(config, place)):
                 refuse(key, f"{one_of(known, name)} (names under {place})")
     if config["paper"]["comparison"]["case"] not in config["paper"]["timing"]["cases"]:
         refuse("paper.comparison.case", "expected one of paper.timing.cases")
@@ -72,16 +69,14 @@ def check_config():
     creep = config["creep"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
         refuse("creep.shown", f"expected a name under creep.tables, got {creep['shown']!r}")
-    scenes = {f"paper.cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["paper"]["cases"].items()}
-    for name, entry in config["accuracy"]["scenes"].items():
-        scenes[f"accuracy.scenes.{name}"] = (entry["scene"], entry["set"])
+    scenes = {
+        f"{place}.{name}": (entry["scene"], entry["set"])
+        for place in ("paper.cases", "accuracy.scenes", "cost.scenes", "hard_cases.vehicles")
+        for name, entry in setting(config, place).items()
+    }
     for vehicle, entry in config["speeds"]["vehicles"].items():
         for track, there in config["speeds"]["tracks"].items():
             scenes[f"speeds.vehicles.{vehicle} on speeds.tracks.{track}"] = (entry["scene"], entry["set"] | there)
-    for name, entry in config["cost"]["scenes"].items():
-        scenes[f"cost.scenes.{name}"] = (entry["scene"], entry["set"])
-    for name, entry in config["hard_cases"]["vehicles"].items():
-        scenes[f"hard_cases.vehicles.{name}"] = (entry["scene"], entry["set"])
     for case, entry in config["hard_cases"]["families"]["integration"]["long_run"]["changes"].items():
         place = f"hard_cases.families.integration.long_run.changes.{case}"
         vehicle = config["hard_cases"]["vehicles"][case]
@@ -94,14 +89,14 @@ def check_config():
             if "exact" in entry:
                 more = config["accuracy"]["exact"][model]
                 scenes[f"accuracy.exact.{model} with accuracy.scenes.{name}"] = (entry["scene"], entry["set"] | more)
-    scenes["patch.cost"] = (config["patch"]["cost"]["scene"], config["patch"]["cost"]["set"])
+    for place in ("patch.cost", "patch.cells"):
+        scenes[place] = (setting(config, place)["scene"], setting(config, place)["set"])
     scenes["paper.geometry"] = (config["paper"]["geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
             place = f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"
             scenes[place] = (entry["scene"], entry["set"] | changes)
     scenes["crossings.scene"] = (config["crossings"]["scene"], {})
-    scenes["patch.cells"] = (config["patch"]["cells"]["scene"], config["patch"]["cells"]["set"])
     for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
         for name, model in config["patch"]["runs"]["models"].items():
             place = f"patch.runs.vehicles.{vehicle} with patch.runs.models.{name}"
@@ -224,9 +219,15 @@ BY_KEY = {"hunting": {"changes"}}
 
 def names_at(data, key):
     """Names at a dotted key: one, a list, or the keys of a mapping."""
+    found = setting(data, key)
+    return [found] if isinstance(found, str) else list(found)
+
+
+def setting(data, key):
+    """Value at a dotted key."""
     for part in key.split("."):
         data = data[part]
-    return [data] if isinstance(data, str) else list(data)
+    return data
 
 
 if workflow.is_main_process:  # jobs get a configuration that has been checked

@@ -80,35 +80,25 @@ rule fig1_parametrisation:
         shown("paper/fig1_parametrisation.png", "1"),
         "<results>/paper/fig1_parametrisation.svg",
     log: "<logs>/fig1_parametrisation.log"
-    script: "../scripts/paper/fig1_parametrisation.py"
+    script: "../scripts/paper/surfaces.py"
 
 
-rule fig2_profiles:
+use rule fig1_parametrisation as fig2_profiles with:
     message: "Fig. 2: points on the profiles"
-    input:
-        core=CORE["figures"],
-        scenes=SCENES,
-        scene=config["paper"]["geometry"]["scene"],
     output:
         shown("paper/fig2_profiles.png", "2"),
         "<results>/paper/fig2_profiles.svg",
     log: "<logs>/fig2_profiles.log"
-    script: "../scripts/paper/fig2_profiles.py"
 
 
-rule fig3_detection:
+use rule fig1_parametrisation as fig3_detection with:
     message: "Fig. 3: planar and spatial detection"
-    input:
-        core=CORE["figures"],
-        scenes=SCENES,
-        scene=config["paper"]["geometry"]["scene"],
     output:
         shown("paper/fig3_detection.png", "3"),
         "<results>/paper/fig3_detection.svg",
     log: "<logs>/fig3_detection.log"
     params:
         pose=config["paper"]["figures"]["detection_pose"],
-    script: "../scripts/paper/fig3_detection.py"
 
 
 rule fig4_lateral_position:

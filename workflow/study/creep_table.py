@@ -2,6 +2,7 @@
 
 import os
 
+from wrcore.analysis.wear.evolve import load_wear_plan
 from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.scene.description import load_scene
@@ -27,3 +28,17 @@ def with_creep_table(source, changes, table):
     if isinstance(changes, dict):
         return {**changes, "contact.creep.table": path}
     return [*changes, f"contact.creep.table={path}"]
+
+
+def plan_with_creep_table(plan, changes, table):
+    """Return the changes of a wear plan, with ``contact.creep.table`` added in scenes that read a default creep table.
+
+    A default creep table has the default planes and tolerance.
+    """
+    data, scenes = load_wear_plan(plan, changes)
+    given = {"contact.creep.table": os.path.abspath(table)}
+    parts = [
+        part | {"set": part["set"] | given} if reads_default_table(scene.data["contact"]) else part
+        for part, scene in zip(data["scenes"], scenes, strict=True)
+    ]
+    return {**changes, "scenes": parts}

@@ -2,8 +2,8 @@
 
 import pytest
 
+from study.creep_table import plan_with_creep_table
 from study.wear.influences import variant_changes
-from study.wear.plan_table import plan_with_creep_table
 from tests.conftest import ELLIPTIC
 from wrcore.analysis.wear.evolve import load_wear_plan
 
