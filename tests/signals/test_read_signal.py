@@ -6,6 +6,8 @@ import pytest
 import scipy.io
 
 import wrcore as wr
+from wrcore.signals import hdf5_file
+from wrcore.signals.mat_file import read_mat5
 
 T = np.round(np.arange(0.0, 0.05, 0.005), 6)
 AY = np.round(np.sin(40.0 * T), 4)  # m/s^2
@@ -174,6 +176,42 @@ def test_matlab_files_have_structures_matrices_and_rates(form, tmp_path):
     check(wr.read_signal(path, names, units=units), 1e-9)
 
 
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab_arrays_are_those_of_scipy(compressed, tmp_path):
+    """All types of numbers, small and empty arrays, structures in structures; cells and complex numbers are skipped."""
+    types = ("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8")
+    content = {f"a_{name}": np.arange(7).astype(name).reshape(1, 7) for name in types}
+    content |= {"cube": np.arange(24.0).reshape(2, 3, 4), "one": np.array([[5.0]]), "none": np.zeros((0, 0))}
+    content |= {"yes": np.array([[True, False]]), "long_name_of_an_array": np.ones((3, 1))}
+    inner = {"x": np.arange(3.0)[None], "text": "m/s²"}
+    path = tmp_path / "a.mat"
+    left_out = {"cell": np.array([1, "a"], dtype=object), "z": np.array([[1 + 2j]])}
+    scipy.io.savemat(path, content | left_out | {"s": {"t": {**inner}}}, do_compression=compressed)
+    found = read_mat5(path)
+    for name, values in content.items():
+        np.testing.assert_array_equal(found[name], values)
+        assert found[name].dtype.kind == (values.dtype.kind if name != "yes" else "u")
+    assert found["s"]["t"]["text"] == "m/s²" and found["s"]["t"]["x"].tolist() == [[0.0, 1.0, 2.0]]
+    assert found.keys() == content.keys() | {"s"}
+
+
+def test_a_unit_in_a_structure_is_that_of_its_values(tmp_path):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"time": T, "floor": {"data": AY / 9.80665, "unit": "g"}})
+    np.testing.assert_allclose(wr.read_signal(path, {"floor.data": "a.ay_m_per_s2"})["a.ay_m_per_s2"], AY, atol=1e-12)
+
+
+def test_every_cut_of_a_matlab_file_is_one_line(tmp_path):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"time": T, "s": {"a": AY}})
+    whole = path.read_bytes()
+    for size in range(0, len(whole) - 8, 8):
+        path.write_bytes(whole[:size])
+        with pytest.raises(wr.InputError) as caught:
+            wr.read_signal(path)
+        assert "\n" not in str(caught.value)
+
+
 def test_hdf5_files_have_units_and_rate_as_attributes(tmp_path):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
@@ -220,7 +258,7 @@ DAMAGED = {
     "cut.mat": (_cut_mat, "expected a MATLAB file"),
     "cut.h5": (_cut_hdf5, "expected an HDF5 file"),
     "linked.h5": (_linked, "expected arrays of numbers"),
-    "filter.h5": (_unknown_filter, "a: expected numbers in the file, got a dataset with an unknown filter"),
+    "filter.h5": (_unknown_filter, "got a dataset with an unknown filter: a"),
 }  # fmt: skip
 
 
@@ -232,6 +270,18 @@ def test_a_damaged_file_is_one_line(name, tmp_path):
     with pytest.raises(wr.InputError, match=expected) as caught:
         wr.read_signal(path)
     assert "\n" not in str(caught.value) and name in str(caught.value)
+
+
+@pytest.mark.parametrize("code", ["import os; os.abort()", "import time; time.sleep(60)"])
+def test_a_crash_or_hang_of_the_hdf5_library_is_one_line(code, tmp_path, monkeypatch):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["time"] = T
+    (tmp_path / "h5py.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(hdf5_file, "PATIENCE", 3.0)
+    with pytest.raises(wr.InputError, match="got a damaged file, on which the HDF5 library (crashes|does not return)"):
+        wr.read_signal(path)
 
 
 def test_a_line_that_was_not_finished_is_left_out(tmp_path, capsys):

@@ -108,7 +108,8 @@ def _seconds(column, table, k):
         times = pd.to_timedelta(texts, errors="coerce").dt.total_seconds().to_numpy()
         times = times + 86400.0 * np.concatenate([[0], np.cumsum(np.diff(np.nan_to_num(times)) < -43200.0)])
     else:
-        dated = pd.to_datetime(texts, errors="coerce", format="mixed", dayfirst=bool(re.match(r"\d{1,2}\.", texts[0])))
+        is_day_first = bool(re.match(r"\d{1,2}\.", texts.iloc[0]))
+        dated = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True, dayfirst=is_day_first)
         times = (dated - dated.iloc[0]).dt.total_seconds().to_numpy()
     if not np.isfinite(times).any():
         raise InputError(table.path, table.titles[k], f"expected times such as 12:34:56.789, got {texts.iloc[0]!r}")

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 
 import h5py
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.errors.checked_hdf5 import dataset_fault
 from wrcore.errors.input_files import check_regular
 from wrcore.errors.messages import warn
+from wrcore.signals.hdf5_file import UNIT_NAMES, read_hdf5
+from wrcore.signals.mat_file import read_mat5
 from wrcore.signals.table import MeasuredTable
 
 RATES = {"fs": 1, "samplerate": 1, "samplingrate": 1, "samplefrequency": 1, "samplingfrequency": 1, "rate": 1} | {
     "dt": -1, "sampletime": -1, "sampleinterval": -1, "samplinginterval": -1, "ts": -1,
 }  # fmt: skip
 """Names of scalars that state the sampling rate in Hz (exponent 1) or the sampling interval in s (exponent -1)."""
-
-UNIT_NAMES = "unit", "units", "Unit", "Units", "UNITS", "UNIT"
-"""Attributes of a dataset, or fields of a structure, that state the unit."""
 
 MOST_COLUMNS = 10_000
 """Largest number of columns that are read from a matrix; more columns than this are a picture or a mistake."""
@@ -47,62 +44,46 @@ def kind_of(path) -> str:
 
 def read_mat_table(path) -> MeasuredTable:
     """Read the arrays of a MATLAB file of version 4 or 5, also those in structures, as columns."""
+    try:
+        content = read_mat5(path) if _is_version_5(path) else _read_mat4(path)
+    except Exception as error:  # a damaged file fails in as many ways as the readers have
+        raise InputError(path, "", f"expected a MATLAB file, got: {str(error)[:200] or type(error).__name__}") from None
+    return _table(path, [part for name, value in content.items() for part in _flat(name, value)])
+
+
+def _is_version_5(path):
+    with open(path, "rb") as file:
+        head = file.read(128)
+    return head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI")
+
+
+def _read_mat4(path):
     from scipy.io import loadmat
 
-    try:
-        with np.errstate(all="ignore"):
-            content = loadmat(path, squeeze_me=True, struct_as_record=True)
-    except Exception as error:  # a damaged file fails in as many ways as the reader has
-        raise InputError(path, "", f"expected a MATLAB file, got: {str(error)[:200] or type(error).__name__}") from None
-    found = []
-    for name, value in content.items():
-        if not name.startswith("__"):
-            found += _flat(name, value)
-    return _table(path, found)
+    with np.errstate(all="ignore"):
+        content = loadmat(path)
+    return {name: value for name, value in content.items() if not name.startswith("__")}
 
 
 def read_hdf5_table(path) -> MeasuredTable:
     """Read the datasets of an HDF5 file as columns; attributes state units and the sampling rate."""
-    found = []
     try:
-        with h5py.File(path, "r") as file:
-            if str(file.attrs.get("format", "")).startswith("wrcore"):
-                raise InputError(path, "", "expected a measured signal, got a file of wrcore: wr.load_run reads runs")
-            for name, dataset in _datasets(file):
-                unit = next((_text(dataset.attrs[key]) for key in UNIT_NAMES if key in dataset.attrs), "")
-                found.append((name, unit, dataset[()]))
-            for item in (file, *(group for group in file.values() if isinstance(group, h5py.Group))):
-                found += [(key, "", np.asarray(value)) for key, value in item.attrs.items() if _exponent(key)]
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails in as many ways as h5py has
-        raise InputError(path, "", f"expected an HDF5 file, got: {str(error)[:200]}") from None
+        found = read_hdf5(path)
+    except (ValueError, OSError) as error:
+        raise InputError(path, "", f"expected an HDF5 file of a measured signal, got {error}") from None
     return _table(path, found)
 
 
-def _datasets(file) -> Iterator[tuple[str, h5py.Dataset]]:
-    """Yield name and dataset of all datasets of numbers that are stored in the file itself."""
-    names: list[str] = []
-    file.visititems_links(lambda name, link: names.append(name) if isinstance(link, h5py.HardLink) else None)
-    for name in names:
-        if "#" in name:  # references of MATLAB
-            continue
-        item = file.get(name)
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub":
-            fault = dataset_fault(item.id)
-            if fault:
-                raise InputError(file.filename, name, f"expected numbers in the file, got {fault}")
-            yield name.replace("/", "."), item
+def _flat(name, value):
+    """Return name, unit and array of each array of numbers in a value of a MATLAB file.
 
-
-def _flat(name, value, depth=4):
-    """Return name, unit and array of each array of numbers in a value of a MATLAB file."""
-    array = np.asarray(value)
-    if array.dtype.names and depth and array.ndim == 0:
-        unit = next((_text(array[key][()]) for key in UNIT_NAMES if key in array.dtype.names), "")
-        inner = [part for key in array.dtype.names for part in _flat(f"{name}.{key}", array[key][()], depth - 1)]
+    A text in a field such as ``unit`` of a structure is the unit of the structure's other fields."""
+    if isinstance(value, dict):
+        unit = next((value[key] for key in UNIT_NAMES if isinstance(value.get(key), str)), "")
+        inner = [part for key, field in value.items() for part in _flat(f"{name}.{key}", field)]
         return [(key, unit or said, values) for key, said, values in inner]
-    return [(name, "", array)] if array.dtype.kind in "fiub" else []
+    is_numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+    return [(name, "", value)] if is_numbers else []
 
 
 def _table(path, found) -> MeasuredTable:
@@ -133,12 +114,3 @@ def _table(path, found) -> MeasuredTable:
 
 def _exponent(name):
     return RATES.get(name.lower().replace("_", "").replace(" ", ""))
-
-
-def _text(value):
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    value = np.asarray(value)
-    return (
-        _text(value.flat[0]) if value.size == 1 and value.dtype.kind in "SO" else str(value) if value.size == 1 else ""
-    )

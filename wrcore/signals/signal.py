@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 AXIS_UNITS = {"t_s": ("s", "Hz"), "s_m": ("m", "1/m")}
 """Unit of the axis and unit of frequencies along it, by the name of the axis."""
 
+MOST_SAMPLES = 50_000_000
+"""Largest number of even steps of a signal; more do not fit into the memory of most machines."""
+
 Axis = Literal["t_s", "s_m"]
 Band = tuple[float | None, float | None]
 
@@ -122,9 +125,10 @@ class Signal:
         """Return the signal at even steps (s or m), whose positions are multiples of the step.
 
         Before a coarser grid a low-pass removes frequencies above 80 % of the largest one that the grid can hold."""
-        if not 0.0 < step < self.x[-1] - self.x[0]:
-            expected = f"expected a step above 0 and below the {self.x[-1] - self.x[0]:g} of the signal"
-            raise InputError("resampled", "step", f"{expected}, got {step:g}")
+        length = float(self.x[-1] - self.x[0])
+        if not length / MOST_SAMPLES < min(step, self.step) or not step < length:
+            expected = f"expected a step below the {length:g} of the signal, and at most {MOST_SAMPLES:g} steps"
+            raise InputError("resampled", "step", f"{expected}, got {step:g} and samples {self.step:g} apart")
         grid = grid_of(self.x, step)
         return replace(self, x=grid, values={name: on_grid(self.x, part, grid) for name, part in self.values.items()})
 

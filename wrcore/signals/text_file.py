@@ -118,7 +118,7 @@ def _are_decimal_commas(lines):
     """Whether the commas of a file with one title and no points are decimal marks of a single column."""
     rows = _sample(lines)
     two = all(len(split(line, ",")) == 2 and "." not in line for line in rows)
-    titles = [line for line in lines[: len(lines) // 2] if not _is_value(split(line, ",")[0])]
+    titles = [line for line in lines[: len(lines) // 2] if not _is_value("".join(split(line, ",")[:1]))]
     return two and bool(titles) and "," not in titles[-1]
 
 

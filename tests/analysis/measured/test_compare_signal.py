@@ -105,6 +105,12 @@ def test_sections_are_those_of_the_path_by_default():
     assert sections_of_length(0.0, 10.4, 4.0) == [(0.0, 4.0), (4.0, 8.0), (8.0, 12.0)]
 
 
+def test_sections_without_samples_have_no_rows():
+    run = run_with(sine)
+    found = wr.compare(run, wr.Signal("t_s", run.t, {"wheelset.y_m": sine(run.t)}), sections=[(100.0, 200.0)])
+    assert found.sections.empty and found.validation.empty and "correlation" in repr(found)
+
+
 def test_spectra_find_density_transfer_and_coherence():
     """White noise of 2 mm at 200 Hz has the density (2 mm)^2 / 100 Hz; a run of three times the signal plus noise."""
     signal = RANDOM.normal(0.0, 2e-3, 40_000)
@@ -133,6 +139,7 @@ def test_figures_have_units():
         ({"limits": {"y_m": {"rms": 1.0}}}, "expected the limit of the mean and that of the standard"),
         ({"limits": {"y_m": (1, 2)}}, "expected pairs by statistic"),
         ({"sections": 1e-4}, "expected a length above 0.005"),
+        ({"sections": []}, "expected pairs of a begin"),
         ({"sections": [(2.0, 1.0)]}, "expected pairs of a begin and a greater end"),
         ({"band": (20.0, 300.0)}, "expected corners above 0"),
     ],

@@ -168,9 +168,10 @@ def _sections(run, simulated, wanted):
             raise InputError("compare", "sections", f"expected a length above {simulated.step:g}, got {wanted}")
         return sections_of_length(begin, end, wanted)
     if wanted is not None:
-        if any(len(section) != 2 or not section[0] < section[1] for section in wanted):
+        pairs = [tuple(section) for section in wanted]
+        if not pairs or any(len(pair) != 2 or not pair[0] < pair[1] for pair in pairs):
             raise InputError("compare", "sections", "expected pairs of a begin and a greater end")
-        return [(float(low), float(high)) for low, high in wanted]
+        return [(float(low), float(high)) for low, high in pairs]
     try:
         s = np.maximum.accumulate(values_of_run(run, distance_channel(run)))
     except InputError:

@@ -63,15 +63,18 @@ def validation_table(sections: pd.DataFrame, limits: Mapping[str, Any]) -> pd.Da
     mean, limit of the standard deviation) by quantity and statistic: ``{"Q_N": {"maximum": (4e3, 6e3)}}``. Columns:
     quantity, unit, statistic, values (their number), mean, standard_deviation (NaN for one value), largest (amount of a
     difference), limit_mean, limit_standard_deviation, is_met (empty without a limit)."""
-    named = sections.assign(quantity=sections["channel"].str.rpartition(".")[2])
-    groups = named.groupby(["quantity", "unit", "statistic"], sort=False)["difference"]
-    table = groups.agg(
-        values="size", mean="mean", standard_deviation="std", largest=lambda values: values.abs().max()
-    ).reset_index()
+    named = sections.assign(quantity=[channel.rpartition(".")[2] for channel in sections["channel"]])
+    rows = [
+        (*key, part.size, part.mean(), part.std(), part.abs().max())
+        for key, part in named.groupby(["quantity", "unit", "statistic"], sort=False)["difference"]
+    ]
+    columns = ["quantity", "unit", "statistic", "values", "mean", "standard_deviation", "largest"]
+    table = pd.DataFrame(rows, columns=columns)
     _check_limits(limits, set(table["quantity"]))
     no_limits = (np.nan, np.nan)
     pairs = [tuple(limits.get(row.quantity, {}).get(row.statistic, no_limits)) for row in table.itertuples()]
-    table["limit_mean"], table["limit_standard_deviation"] = zip(*pairs, strict=True) if pairs else ((), ())
+    table["limit_mean"] = [float(mean) for mean, _ in pairs]
+    table["limit_standard_deviation"] = [float(deviation) for _, deviation in pairs]
     table["is_met"] = [
         "" if np.isnan(mean) else bool(abs(row.mean) <= mean and row.standard_deviation <= deviation)
         for row, (mean, deviation) in zip(table.itertuples(), pairs, strict=True)
