@@ -27,7 +27,7 @@ GROUPS = {
     "Response, curving, roll": (
         "frequency_response", "plot_frequency_response", "quasi_static_curving", "roll_coefficient",
     ),
-    "Pictures": ("draw", "plot_wheel_on_rail"),
+    "Pictures and reports": ("report", "ReportPage", "draw", "plot_wheel_on_rail"),
     "Assessment, damage and wear": (
         "assess", "Assessment", "section_statistics", "damage_table", "plot_shakedown", "local_wear",
         "WheelWear", "evolve",

@@ -7,7 +7,7 @@ from tests.conftest import ROOT
 
 ROOMS = (
     "errors", "kernels", "geometry", "bodies", "contact", "creep", "wheels", "track", "forces", "equations", "jacobian",
-    "integrate", "vehicle", "balance", "scene", "reference", "run", "sweep", "signals", "analysis", "cli",
+    "integrate", "vehicle", "balance", "scene", "reference", "run", "sweep", "signals", "analysis", "reporting", "cli",
 )  # fmt: skip
 """In the order of the data; ``wrcore/__init__.py`` is the door to all of them."""
 

@@ -49,6 +49,8 @@ from wrcore.creep.table import ensure_table as ensure_table
 from wrcore.errors import InputError as InputError
 from wrcore.geometry.profiles.standards import list_profiles as list_profiles
 from wrcore.geometry.profiles.standards import named_profile as named_profile
+from wrcore.reporting.report import ReportPage as ReportPage
+from wrcore.reporting.report import report as report
 from wrcore.run.motion import hunting_frequency as hunting_frequency
 from wrcore.run.output.files import load_run as load_run
 from wrcore.run.output.files import load_runs as load_runs

@@ -33,10 +33,11 @@ from wrcore.cli import (
 from wrcore.cli.common.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
+from wrcore.reporting import command as report
 
 COMMANDS = (
-    init, simulate, fmu, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table,
-    profiles, keys,
+    init, simulate, fmu, sweep, report, assess, compare, response, curving, draw, evolve, contact, conicity, creep,
+    table, profiles, keys,
 )  # fmt: skip
 """Modules with one command each, in the order of the help: ``add(commands)`` adds its parser, ``run(options)`` executes
 the command."""

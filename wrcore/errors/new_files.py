@@ -65,6 +65,18 @@ def try_out(path: str | os.PathLike[str]) -> None:
     part.unlink()
 
 
+def output(path: str | os.PathLike[str], endings: Iterable[str] = (".csv",), option: str = "--out") -> Path:
+    """Refuse an output path that cannot be written, or has another ending, before the computation starts."""
+    named(path, endings, option)
+    if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or (os.path.exists(path) and not os.path.isfile(path)):
+        raise InputError(option, path, "expected a file in an existing folder")
+    try:  # permissions do not tell whether a disk is full or a name is too long
+        try_out(path)
+    except OSError as error:
+        raise InputError(option, path, f"expected a file that can be written: {error.strerror}") from None
+    return Path(path)
+
+
 def locked(descriptor: int) -> bool:
     """Lock an open file or folder until this process ends; return False if another process has locked it."""
     try:

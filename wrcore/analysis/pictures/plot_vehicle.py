@@ -90,6 +90,19 @@ def plot_vehicle(scene):
     return figure
 
 
+def draw_view(axes, vehicle, view):
+    """Draw a vehicle's nominal position in one view, ``"side"`` or ``"plan"``, into axes, without texts."""
+    upright, bodies = dict(VIEWS)[view], vehicle.data["bodies"]
+    parts = [*_elements(vehicle), *_joints(vehicle)]
+    low, high = _limits(bodies, parts)
+    for name, body in bodies.items():
+        _draw_body(axes, name, body, view, upright)
+    _draw_parts(axes, parts, view, upright)
+    _rails(axes if view == "side" else None, axes if view == "plan" else None, bodies, low, high)
+    axes.set(xlabel="x, forward / m", ylabel=("y, to the left / m", "z, up / m")[upright - 1], aspect="equal")
+    axes.set(xlim=(low[0] - 0.3, high[0] + 0.3), ylim=(low[upright] - 0.15, high[upright] + 0.15))
+
+
 def _elements(vehicle):
     """Return the force elements of a vehicle as `Part`."""
     bodies = vehicle.data["bodies"]
@@ -235,12 +248,13 @@ def _meet(one, other):
 
 
 def _rails(side, plan, bodies, low, high):
-    """Draw the rails at the height of their highest points, if a vehicle has wheelsets."""
+    """Draw the rails at the height of their highest points, if a vehicle has wheelsets, in the views that are given."""
     reach = {b["tape_circle_half_distance"] for b in bodies.values() if b["kind"] == "wheelset"}
     ends = [low[0] - 0.5, high[0] + 0.5]
     look = {"color": "0.6", "linewidth": 1.6, "zorder": 0}
-    if reach:
+    if reach and side is not None:
         side.plot(ends, [0.0, 0.0], **look)
+    if reach and plan is not None:
         for y in (-max(reach), max(reach)):
             plan.plot(ends, [y, y], **look)
 

@@ -1,23 +1,10 @@
 """Output files of commands: paths are checked before the computation, and files are never incomplete."""
 
 import json
-import os
-from pathlib import Path
 
 from wrcore.errors import InputError
-from wrcore.errors.new_files import HDF5, appearing, named, try_out
-
-
-def output(path, endings=(".csv",), option="--out"):
-    """Refuse an output path that cannot be written, or has another ending, before the computation starts."""
-    named(path, endings, option)
-    if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or (os.path.exists(path) and not os.path.isfile(path)):
-        raise InputError(option, path, "expected a file in an existing folder")
-    try:  # permissions do not tell whether a disk is full or a name is too long
-        try_out(path)
-    except OSError as error:
-        raise InputError(option, path, f"expected a file that can be written: {error.strerror}") from None
-    return Path(path)
+from wrcore.errors.new_files import HDF5, appearing
+from wrcore.errors.new_files import output as output
 
 
 def refuse_others(path, attribute, wanted):
