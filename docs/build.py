@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 GUIDES = (
     "first_result", "bring_your_own", "scenes", "contact_models", "lubrication", "tracks", "crossings",
     "vehicle_files", "own_physics", "freight_wagon", "co_simulation", "fmi", "sweeps", "clusters", "arrays",
-    "assessment", "signals", "wear", "how_runs_end", "accuracy", "limits", "patch", "looked_up", "stability",
-    "response", "cost", "comparison", "gallery", "evidence", "versions",
+    "assessment", "report_page", "signals", "wear", "how_runs_end", "accuracy", "limits", "patch", "looked_up",
+    "stability", "response", "cost", "comparison", "gallery", "evidence", "versions",
 )  # fmt: skip
 """Pages of `reports/` in reading order; others follow."""
 

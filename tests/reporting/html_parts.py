@@ -39,6 +39,6 @@ class Parts(HTMLParser):
 HARMLESS = {
     "a", "body", "caption", "clippath", "data", "defs", "div", "figcaption", "figure", "footer", "g", "h1", "h2", "h3",
     "head", "header", "html", "li", "line", "main", "meta", "nav", "p", "path", "rect", "section", "small", "span",
-    "strong", "style", "svg", "table", "tbody", "td", "text", "th", "thead", "title", "tr", "ul", "use", "image", "tspan",
+    "strong", "style", "svg", "table", "tbody", "td", "text", "th", "thead", "title", "tr", "ul", "use",
 }  # fmt: skip
 """Tags that a report may have: none of them executes or loads anything."""

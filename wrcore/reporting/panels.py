@@ -6,6 +6,7 @@ import hashlib
 import io
 import re
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -33,7 +34,7 @@ BINS = 300
 LEAST_BINS = 60
 """Smallest number of bins of a line, for pages with very many lines."""
 
-SETTINGS = {
+SETTINGS: dict[str, Any] = {
     **STYLE, "font.size": FONT, "axes.labelsize": FONT, "xtick.labelsize": FONT - 0.5, "ytick.labelsize": FONT - 0.5,
     "lines.linewidth": 1.0, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6,
     "svg.fonttype": "none", "font.family": "sans-serif", "axes.titlesize": FONT, "axes.titlepad": 3.0,
@@ -61,7 +62,8 @@ def panel(
         Whether the height follows from the limits of the axes, for a picture that is true to scale; then the margins
         are computed from the texts.
     """
-    with rc_context({**SETTINGS, "svg.hashsalt": hashlib.sha256(label.encode()).hexdigest()}):
+    settings: Any = {**SETTINGS, "svg.hashsalt": hashlib.sha256(label.encode()).hexdigest()}
+    with rc_context(settings):
         figure = Figure(figsize=size, layout="constrained" if fits else None)
         axes = figure.subplots()
         draw(axes)

@@ -104,7 +104,9 @@ def _track(track: Mapping[str, Any]) -> str:
               "support": "flexible track", "corrugation": "corrugation"}  # fmt: skip
     texts += [text for name, text in extras.items() if track.get(name)]
     gauge = track.get("gauge")
-    return ", ".join([*texts, f"gauge {1e3 * gauge:g} mm"] if _is_number(gauge) else texts)
+    if isinstance(gauge, int | float):
+        texts.append(f"gauge {1e3 * gauge:g} mm")
+    return ", ".join(texts)
 
 
 def _friction(value: Any) -> str:
@@ -124,7 +126,7 @@ def _patch(contact: Mapping[str, Any]) -> str:
 
 def _integration(settings: Mapping[str, Any]) -> str:
     method = str(settings.get("method_used") or settings.get("method", ""))
-    if _is_number(step := settings.get("step")) and step > 0.0:
+    if isinstance(step := settings.get("step"), int | float) and step > 0.0:
         return f"{method}, steps of {step:g} s"
     return f"{method}, relative tolerance {settings['rtol']:g}" if _is_number(settings.get("rtol")) else method
 

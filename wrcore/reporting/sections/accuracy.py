@@ -24,9 +24,9 @@ from wrcore.errors.messages import warnings_suppressed
 from wrcore.reporting.page import Markup, Row, element, join, number, paragraph, quantities, table
 from wrcore.reporting.subject import Report, Subject
 from wrcore.run.checks.validity import LOOK_UP_ERRORS, MEANINGS
+from wrcore.run.output.compute import ON_RAIL
 from wrcore.run.output.run import Run
 from wrcore.run.simulate import simulate
-from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene
 
 TITLE = "Accuracy"
@@ -97,7 +97,8 @@ def integrated_again(subject: Subject) -> Again:
     stretch = min(STRETCH, simulated)
     if wall > 0.0:
         stretch = min(stretch, BUDGET / COST / wall * simulated)
-    stretch = float(run.t[max(np.searchsorted(run.t, stretch, side="right") - 1, min(2, len(run.t) - 1))])
+    last = int(np.searchsorted(run.t, stretch, side="right")) - 1
+    stretch = float(run.t[max(last, 2)])
     data = copy.deepcopy(scene.data)
     integration = data["integration"]
     method = str(run.settings.get("method_used", integration["method"]))

@@ -11,8 +11,12 @@ from wrcore.reporting.page import Markup, figure, grid, join
 from wrcore.reporting.panels import legend, line, panel
 from wrcore.reporting.subject import Report
 from wrcore.run.output.channels import DESCRIPTIONS
+from wrcore.run.output.run import Run
 
 TITLE = "Motion"
+
+MOST = 6
+"""Largest number of channels that are drawn of a run without the default ones."""
 
 VARIES = 0.01
 """Relative variation of a speed from which on it is drawn."""
@@ -30,9 +34,9 @@ def chosen(report: Report) -> list[str]:
     """Return the channels that are drawn by default: y and yaw of wheelsets, y, z and roll of the highest other
     body, and its speed if the speed varies."""
     run = report.subjects[0].run
-    bodies = [name for name, channels in run.groups.items() if "z_m" in channels and "/" not in name]
-    bodies = [name for name in bodies if name not in report.subjects[0].wheelsets]
-    bodies.sort(key=lambda name: -float(np.mean(run.groups[name]["z_m"])))
+    bodies = [name for name in run.groups if "/" not in name and name not in report.subjects[0].wheelsets]
+    heights = {name: float(np.mean(run.groups[name].get("z_m", 0.0))) for name in bodies}
+    bodies.sort(key=lambda name: -heights[name])
     wanted = [f"{name}.y_m" for name in report.wheelsets]
     wanted += [f"{name}.yaw_rad" for name in report.wheelsets[:1]]
     wanted += [f"{name}.{channel}" for name in bodies[:1] for channel in ("y_m", "z_m", "roll_rad")]
@@ -40,10 +44,16 @@ def chosen(report: Report) -> list[str]:
     speed = run.groups.get(first, {}).get("vx_m_per_s")
     if speed is not None and np.ptp(speed) > VARIES * np.abs(speed).max():
         wanted.append(f"{first}.vx_m_per_s")
-    return [name for name in wanted if any(_has(subject.run, name) for subject in report.subjects)]
+    return [name for name in wanted if any(_has(subject.run, name) for subject in report.subjects)] or _any(run)
 
 
-def _has(run: Any, name: str) -> bool:
+def _any(run: Run) -> list[str]:
+    """Return the first channels of a run that has none of those that are drawn by default."""
+    names = [f"{group}.{channel}" for group, channels in run.groups.items() for channel in channels if group]
+    return names[:MOST]
+
+
+def _has(run: Run, name: str) -> bool:
     group, _, channel = name.rpartition(".")
     return group in run.groups and run[group].follows(channel)
 
@@ -53,8 +63,12 @@ def _panel(report: Report, name: str) -> Markup:
     curves = [
         (subject, *found)
         for subject, found in report.each(
-            f"Channel {name}", lambda subject: (report.abscissa(subject, group), values_of(subject.run, name))
+            f"Channel {name}",
+            lambda subject: (
+                (report.abscissa(subject, group), values_of(subject.run, name)) if _has(subject.run, name) else None
+            ),
         )
+        if found is not None
     ]
     if not curves:
         return Markup("")

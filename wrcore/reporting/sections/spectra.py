@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,9 +34,8 @@ def section(report: Report) -> Markup:
     panels, rows = [], []
     for body in bodies:
         for channel, direction in DIRECTIONS.items():
-            found = list(
-                report.each(f"Spectrum of {body}.{channel}", lambda s, b=body, c=channel: spectrum(report, s, b, c))
-            )  # type: ignore[misc]
+            function = partial(spectrum, report, body, channel)
+            found = list(report.each(f"Spectrum of {body}.{channel}", function))
             name = f"{body.replace('_', ' ')}, {direction}"
             panels.append(_panel(report, found, name))
             rms = {s.label: power for s, (_, _, power) in found}
@@ -66,7 +66,7 @@ def chosen(report: Report) -> list[str]:
     return sorted(groups, key=lambda name: (name in wheelsets, -heights.get(name, 0.0)))[:MOST_BODIES]
 
 
-def spectrum(report: Report, subject: Subject, body: str, channel: str) -> tuple[np.ndarray, np.ndarray, float]:
+def spectrum(report: Report, body: str, channel: str, subject: Subject) -> tuple[np.ndarray, np.ndarray, float]:
     """Return frequencies (Hz), power spectral density ((m/s²)²/Hz) and root mean square (m/s²) of an acceleration."""
     from scipy import signal
 

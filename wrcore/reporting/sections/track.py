@@ -100,10 +100,10 @@ def _line(subject: Subject) -> Line | None:
     """Return the track between the ends of a run; None if the run has no positions."""
     run = subject.run
     places = [channels.get("s_m", channels.get("x_m")) for name, channels in run.groups.items() if "/" not in name]
-    places = [place for place in places if place is not None and np.isfinite(place).any()]
-    if not places:
+    known = [place for place in places if place is not None and np.isfinite(place).any()]
+    if not known:
         return None
-    low, high = min(np.nanmin(place) for place in places), max(np.nanmax(place) for place in places)
+    low, high = min(np.nanmin(place) for place in known), max(np.nanmax(place) for place in known)
     s, path = np.linspace(low, max(high, low + 1.0), SAMPLES), path_of(run)
     stations = [centreline(path, float(at)) for at in s]
     columns = {name: np.array([getattr(one, name) for one in stations]) for name in ("x", "y", "z", "curvature")}
