@@ -65,12 +65,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Leave out files of the other mark without importing them, for ``-m check`` and ``-m "not check"``."""
-    wanted = {"check": True, "not check": False}.get(config.option.markexpr)
-    if wanted is None or not collection_path.name.startswith("test_"):
+    """Leave out files without a test of the mark in ``-m check`` and ``-m "not check"``, and do not import them."""
+    if not collection_path.name.startswith("test_") or config.option.markexpr not in ("check", "not check"):
         return None
-    name = collection_path.relative_to(Path(__file__).parent).as_posix()
-    return True if name.startswith(CHECKS) != wanted else None
+    is_check = collection_path.relative_to(Path(__file__).parent).as_posix().startswith(CHECKS)
+    if config.option.markexpr == "not check":
+        return is_check or None
+    return None if is_check or "mark.check" in collection_path.read_text("utf-8") else True
 
 
 def pytest_collection_modifyitems(items):
