@@ -206,6 +206,7 @@ BAD_FILES = [
     ("", "header", "s_m and columns"),
     (f"x,level_m\n{GOOD}", "header", "s_m and columns"),
     (f"s_m\n{GOOD}", "header", "s_m and columns"),
+    (GOOD, "header", "s_m and columns"),
     (f"s_m,level\n{GOOD}", "level", "a column such as level_m or level_mm, got 'level' without a unit"),
     (f"s_m,level_mrad\n{GOOD}", "level_mrad", "a column such as level_m or level_mm"),
     (f"s_m,level_m,left_lateral_m\n{GOOD}", "header", "s_m and columns"),

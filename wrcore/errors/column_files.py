@@ -138,7 +138,7 @@ def read_column_file(path, rows=None, header=True):
     names = _split(head[1], _separator([head[1]], head[1], separator)) if head[1] else []
     names = names[: len(names) - _n_empty(names)]
     twice = next((name for k, name in enumerate(names) if name and name in names[:k]), None)
-    if twice:
+    if twice and _is_header(head[1]):  # numbers in place of a header may be equal
         raise InputError(path, f"line {head[0]}", f"expected each column once, got {twice} twice")
     cells = _evened([_split(text, separator) for text in texts], len(names), separator)
     if names and cells and _are_units(cells[0], len(names)):
