@@ -32,7 +32,7 @@ GROUPS = {
         "assess", "Assessment", "section_statistics", "damage_table", "plot_shakedown", "local_wear",
         "WheelWear", "evolve",
     ),
-    "Measured signals": ("read_signal", "Signal", "SignalComparison", "fit", "Fit"),
+    "Measured signals": ("read_signal", "Signal", "SignalComparison", "fit", "Fit", "fit_path", "FittedPath"),
     "Many runs": ("load_sweep", "run_sweep"),
     "Errors": ("InputError",),
 }  # fmt: skip

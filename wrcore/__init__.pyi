@@ -65,6 +65,8 @@ from wrcore.scene.description import load_scene as load_scene
 from wrcore.scene.examples import example as example
 from wrcore.signals.read import read_signal as read_signal
 from wrcore.signals.signal import Signal as Signal
+from wrcore.signals.track_path import FittedPath as FittedPath
+from wrcore.signals.track_path import fit_path as fit_path
 from wrcore.sweep.batch import run_sweep as run_sweep
 from wrcore.sweep.plan import load_sweep as load_sweep
 

@@ -70,6 +70,8 @@ def calls():
         "fit": {"scene": scene, "keys": {"initial.y": (0.001, 0.004)}, "signals": the["signal"], "band": (None, 50.0),
                 "noise": {"wheelset.y_m": 1e-5}, "start": {"initial.y": 0.002}, "threads": 1, "most_steps": 1,
                 "progress": False},
+        "fit_path": {"signal": wr.Signal("s_m", np.arange(100.0), {"k_per_m": np.zeros(100)}), "curvature": "k_per_m",
+                     "superelevation": None, "tolerance": 1e-4, "shortest": 20.0},
         "read_signal": {"path": "signal.csv", "channels": {"wheelset.y": "wheelset.y_m"}, "axis": "t_s", "rate": 100.0,
                         "units": {"wheelset.y": "m"}},
         "Signal": {"axis": "t_s", "x": np.array([0.0, 0.1]), "values": {"a": np.zeros(2)}, "units": {"a": "m"},
