@@ -46,6 +46,7 @@ from wrcore.kernels.handles import values_of
 WIDEST = 1.0 / 3.0  # largest semi-axis across rolling over the smaller radius of curvature
 WIDEST_TURN = 0.35  # largest turn of the normal over a patch in a hollow, rad
 FLANGE = 0.5  # contact angle from which a wheel touches with its flange, rad
+FLANK = 10e-3  # depth below the tape circle, m; contact points beyond it are on the tip of the flange
 
 LIMITS = {
     "half_space": "patches too wide for a half-space",
@@ -134,7 +135,7 @@ def flags(contact, patches, roll, yaw):
 
     Flags of patches have shape (n, k, 2, MAX_PATCHES); search_fallback and both_flanges of wheelsets have (n, k).
     """
-    flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
+    flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)  # (n, k, 2)
     offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * _tilt(contact, yaw) ** 2  # as in search
     found = {name: np.zeros(patches.shape[:-1], bool) for name in _OF_PROFILES}
     for k in range(patches.shape[1]) if contact.geometries else (slice(None),):
@@ -143,9 +144,18 @@ def flags(contact, patches, roll, yaw):
             shape = patches.shape[:-1]
             tilt = np.broadcast_to(_tilt(contact, yaw)[..., None, None], shape)[:, k, wheel]
             raised = np.broadcast_to((np.tan(roll)[..., None] * [1.0, -1.0])[..., None], shape)[:, k, wheel]
+            inside = patches[:, k, wheel, :, reduction.U_WHEEL] < _flank(geometry)  # on the tip of the flange
+            flanges[:, k, wheel] |= np.any(inside, axis=-1)
             for name, values in _of_profiles(geometry, patches[:, k, wheel], tilt, raised).items():
                 found[name][:, k, wheel] = values
     return found | {"search_fallback": offset > LARGEST_OFFSET, "both_flanges": np.all(flanges, axis=-1)}
+
+
+def _flank(geometry):
+    """Return the lateral coordinate (m) of the wheel's flank `FLANK` below its tape circle; -inf without a flange."""
+    places = geometry.wheel_start + geometry.wheel_step * np.arange(len(geometry.wheel))
+    radii = geometry.wheel[:, VALUE]
+    return places[(places < 0.0) & (radii > np.interp(0.0, places, radii) + FLANK)].max(initial=-np.inf)
 
 
 def _tilt(contact, yaw):
