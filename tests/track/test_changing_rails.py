@@ -254,7 +254,7 @@ def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
 
 def test_scenes_without_one_compile_nothing_of_it():
     model = Equations(compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml"))[0]).arguments[1].value
-    assert (model.sections, model.strides) == (0, 0)
+    assert (model.kernels.rail_sections_kernel, model.kernels.step_limit_kernel) == (0, 0)
     assert model.contact.geometries == ()
     assert model.contact.geometry.along == ()
 

@@ -123,7 +123,7 @@ def test_left_and_right_are_mirror_images():
 
 def test_scenes_without_one_compile_nothing_of_it():
     model, _ = compile_scene(load_scene(SCENE))
-    assert Equations(model).arguments[1].value.guards == 0
+    assert Equations(model).arguments[1].value.kernels.check_rails_kernel == 0
 
 
 @pytest.mark.parametrize(

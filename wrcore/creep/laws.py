@@ -51,7 +51,7 @@ class CreepData(NamedTuple):
     fastsim: FastsimData
     polach: PolachFactors
     source: np.ndarray = np.zeros(0, np.int64)  # digest of a law of the user's own, see `wrcore.kernels.own`
-    own: int = 0  # address of its kernel
+    own_kernel: int = 0  # address of the kernel of this law
 
 
 def named_law(name, laws):
@@ -110,7 +110,7 @@ def with_user_law(data):
     """Return the `CreepData` with the address of its user's law."""
     example = tuple(map(own.Example, (1.0, 0.0, (1.0,) * 4, 0.0, 0.0, 0.0)))
     kernel = own.addressed(_wrapped, tuple(map(int, data.source)), 0, 0, example, FOUR)
-    return data._replace(own=kernel.address)
+    return data._replace(own_kernel=kernel.address)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -182,7 +182,7 @@ def _other_law(law, data, log_g, g, psi, xi, eta, phi):
     elif law == _POLACH:
         fx, fy, mz = polach(kalker, data.polach, g, xi, eta, phi)
     elif law == USER_LAW:
-        fx, fy, mz, _ = four_at(data.own, g, psi, kalker_coefficients(g, kalker), xi, eta, phi)
+        fx, fy, mz, _ = four_at(data.own_kernel, g, psi, kalker_coefficients(g, kalker), xi, eta, phi)
     else:
         fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, xi, eta, phi)
     return fx, fy, mz, outside

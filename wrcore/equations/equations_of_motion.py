@@ -74,10 +74,10 @@ def wheel_motions(model, state, work):
                 for i in range(6):
                     row[MOTION.vx + i] = state[at + VELOCITY + i]
                 row[MOTION.bend_y] = row[MOTION.bend_z] = 0.0
-    if model.rail_friction != 0:
-        call_address(model.rail_friction, model, state, work)
-    if model.sections != 0:
-        call_address(model.sections, model, state, work)
+    if model.kernels.rail_friction_kernel != 0:
+        call_address(model.kernels.rail_friction_kernel, model, state, work)
+    if model.kernels.rail_sections_kernel != 0:
+        call_address(model.kernels.rail_sections_kernel, model, state, work)
     for j in range(model.bodies.independent.shape[0]):
         k, half = model.bodies.independent[j, 0], state[independent_at(model.bodies, j)]
         for wheel in range(2):
@@ -92,12 +92,12 @@ def _add_rail_wrenches(model, state, work, rate, mode):
     wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, mode & WRENCHES_HELD
     if not held:
         wheel_motions(model, state, work)
-    if model.rails != 0:
-        call_address(model.rails, model, state, work, rate, mode)
+    if model.kernels.flexible_track_kernel != 0:
+        call_address(model.kernels.flexible_track_kernel, model, state, work, rate, mode)
     elif not held:
         press_wheels(model, work, mode)
-    if model.guards != 0 and not held:
-        call_address(model.guards, model, state, work)
+    if model.kernels.check_rails_kernel != 0 and not held:
+        call_address(model.kernels.check_rails_kernel, model, state, work)
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
@@ -133,8 +133,8 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
         _add_rail_wrenches(model, state, work, rate, mode)
         _turn_independent_wheels(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
-    if model.torques != 0:
-        call_address(model.torques, model, t, state, work, rate)
+    if model.kernels.drive_torques_kernel != 0:
+        call_address(model.kernels.drive_torques_kernel, model, t, state, work, rate)
     if bodies.axes.shape[0] > 0:
         turn_to_principal(bodies, work.rotations, work.principal)
     axes = inertia_axes(bodies, work)
@@ -144,7 +144,7 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
         else:
             subtract_gyroscopic(bodies.inertia[b], axes[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
-        call_address(model.reactions, model, t, state, work)
+        call_address(model.kernels.joint_reactions_kernel, model, t, state, work)
     for b in range(n):
         at = STATE_SIZE * b
         euler_rates(state, at, work.turns[b, 0], work.turns[b, 1], work.turns[b, 2], model.alpha, rate)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from wrcore.bodies.joint_forces import add_reactions
+from wrcore.equations.model import Kernels
 from wrcore.forces.control import with_controls
 from wrcore.forces.drive import add_drive
 from wrcore.forces.suspension import with_laws
@@ -73,25 +74,26 @@ def with_kernels(model, work):
     model = model._replace(contact=with_wheels(model._replace(contact=contact)), elements=with_laws(model.elements))
     kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
     if model.joints.equations:
-        kernels["reactions"] = Kernel(add_reactions, kind, 0.0, state, scratch)
+        kernels["joint_reactions_kernel"] = Kernel(add_reactions, kind, 0.0, state, scratch)
     if len(model.controls.rows):
         model, own = with_controls(model, kind, scratch, state)
         kernels |= own
     elif len(model.drive.rows):
-        kernels["torques"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
+        kernels["drive_torques_kernel"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
     if len(model.friction.points):
-        kernels["rail_friction"] = Kernel(fill_rail_friction, kind, state, scratch)
+        kernels["rail_friction_kernel"] = Kernel(fill_rail_friction, kind, state, scratch)
     if len(model.crossing.tables):
-        kernels["sections"] = Kernel(lay_sections, kind, state, scratch)
-        kernels["strides"] = Kernel(shorten_step, kind, state, scratch, state, 0)
+        kernels["rail_sections_kernel"] = Kernel(lay_sections, kind, state, scratch)
+        kernels["step_limit_kernel"] = Kernel(shorten_step, kind, state, scratch, state, 0)
     if len(model.check_rails.rows):
-        kernels["guards"] = Kernel(press_check_rails, kind, state, scratch)
-        kernels["strides"] = Kernel(shorten_near_check_rails, kind, state, scratch, state, 0)
+        kernels["check_rails_kernel"] = Kernel(press_check_rails, kind, state, scratch)
+        kernels["step_limit_kernel"] = Kernel(shorten_near_check_rails, kind, state, scratch, state, 0)
     if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
-        kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
+        kernels["flexible_track_kernel"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
     if len(model.bodies.wheelsets):
-        kernels["wheels"] = Kernel(
+        kernels["wheel_forces_kernel"] = Kernel(
             wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
             work.counters, Kind(work.strips), FRESH,
         )  # fmt: skip
-    return model._replace(**{name: getattr(kernel, "address", kernel) for name, kernel in kernels.items()})
+    addresses = {name: getattr(kernel, "address", kernel) for name, kernel in kernels.items()}
+    return model._replace(kernels=Kernels(**addresses))

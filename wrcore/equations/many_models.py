@@ -59,14 +59,9 @@ def with_kernels_of(model, other):
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
-    names = (
-        "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides", "guards",
-        "slopes",
-    )  # fmt: skip
-    kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
-    kept |= {"elements": _with_laws_of(model.elements, other.elements), "controls": with_control_laws(model.controls)}
-    return model._replace(contact=contact, **kept)
+    elements, controls = _with_laws_of(model.elements, other.elements), with_control_laws(model.controls)
+    return model._replace(contact=contact, elements=elements, controls=controls, kernels=other.kernels)
 
 
 def _with_laws_of(elements, other):
@@ -79,7 +74,7 @@ def _with_laws_of(elements, other):
 def _addresses(contact):
     """Return the addresses of the kernels of patches on strips from a contact model or its wheel-specific models."""
     strips = (*values_of(contact.wheels), contact)[0].strips
-    return {"fallback": strips.fallback, "group": strips.group}
+    return {"grid_kernel": strips.grid_kernel, "patch_forces_kernel": strips.patch_forces_kernel}
 
 
 def _arrays(part):

@@ -42,6 +42,33 @@ class Bodies(NamedTuple):
     `wrcore.bodies.inertia`. Empty if all body axes are principal and all wheelsets are bodies of revolution."""
 
 
+class Kernels(NamedTuple):
+    """Compiled kernels that a model's equations call, by address; 0 if the model does not need this kernel.
+
+    `wrcore.equations.kernels.with_kernels` compiles or loads them."""
+
+    wheel_forces_kernel: int = 0
+    """Forces and moments of the rails on all wheels."""
+    joint_reactions_kernel: int = 0
+    """Reactions of the joints."""
+    rail_friction_kernel: int = 0
+    """Coefficient of friction under each wheel, if it changes along the track."""
+    drive_torques_kernel: int = 0
+    """Torques of motors and brakes."""
+    flexible_track_kernel: int = 0
+    """Forces and moments of the rails on all wheels, on a flexible track."""
+    control_samples_kernel: int = 0
+    """Samples of the control laws."""
+    rail_sections_kernel: int = 0
+    """Rail section under each wheel, on changing rails."""
+    step_limit_kernel: int = 0
+    """Limit of the length of steps on changing rails and near check rails."""
+    check_rails_kernel: int = 0
+    """Forces of check rails."""
+    contact_derivatives_kernel: int = 0
+    """Derivatives of contact forces, for methods with a Jacobian."""
+
+
 class Model(NamedTuple):
     """Compiled scene for kernels."""
 
@@ -55,23 +82,14 @@ class Model(NamedTuple):
     alpha: float
     beta: float
     """Baumgarte's parameters, 1/s."""
-    wheels: int = 0  # address of the kernel of the rails' forces and moments on all wheels, see `with_kernels`
-    reactions: int = 0  # address of the kernel that adds the reactions of the joints
     friction: Schedules = pack_schedules([])
     """Coefficient of friction over arc length for the left and the right rail; empty if it is constant."""
-    rail_friction: int = 0  # address of the kernel that interpolates this coefficient of friction
     drive: Drive = no_drive()  # motors, brakes and speed controller
-    torques: int = 0  # address of the kernel that adds torques of motors and brakes
     flexible_track: FlexibleTrack = rigid_track()  # flexible track under each wheelset
-    rails: int = 0  # address of the kernel of the rails' forces and moments on a flexible track
     controls: Controls = no_controls()  # control laws of the user
-    samples: int = 0  # address of the kernel that samples the control laws
     crossing: Crossing = no_crossing()  # rails that change along the track
-    sections: int = 0  # address of the kernel that writes the rail section under each wheel
-    strides: int = 0  # address of the kernel that limits steps on changing rails and near check rails
     check_rails: CheckRails = no_check_rails()
-    guards: int = 0  # address of the kernel that adds the forces of check rails
-    slopes: int = 0  # address of the kernel of the derivatives of contact forces, for methods with a Jacobian
+    kernels: Kernels = Kernels()
 
 
 class Workspace(NamedTuple):

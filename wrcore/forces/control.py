@@ -126,9 +126,9 @@ def with_controls(model, kind, scratch, state):
     """Return the model with the addresses of its control laws, and a dict of the kernels that evaluate them.
 
     The arguments are examples that determine the types of the kernels' arguments."""
-    kernels = {"torques": Kernel(add_controlled, kind, 0.0, state, scratch, state).address}
+    kernels = {"drive_torques_kernel": Kernel(add_controlled, kind, 0.0, state, scratch, state).address}
     if samples(model):
-        kernels["samples"] = Kernel(take_samples, kind, 0.0, state, scratch, False).address
+        kernels["control_samples_kernel"] = Kernel(take_samples, kind, 0.0, state, scratch, False).address
     return model._replace(controls=with_control_laws(model.controls)), kernels
 
 

@@ -80,26 +80,14 @@ def undriven(model):
     if not (len(model.drive.rows) or len(model.drive.control) or len(model.controls.rows)):
         return model
     none = model.controls._make(array[:0] for array in model.controls)
-    return model._replace(drive=no_drive(), torques=0, samples=0, controls=none)
+    kernels = model.kernels._replace(drive_torques_kernel=0, control_samples_kernel=0)
+    return model._replace(drive=no_drive(), kernels=kernels, controls=none)
 
 
 def may_drive(model):
     """Whether motors, brakes, a controller or control laws may exert a torque at any time."""
     driven = len(model.drive.control) > 0 or len(model.controls.rows) > 0
     return driven or bool(model.drive.tables.points[:, 1].any())
-
-
-def lowest_speed(model):
-    """Return the lowest speed (m/s) to which motors, brakes and a controller may brake a forward-running vehicle.
-
-    This is 0 if motors, brakes or control laws may brake, else the lowest set speed of the controller. It is infinite
-    if no torque can brake the vehicle."""
-    drive, points = model.drive, np.split(model.drive.tables.points[:, 1], model.drive.tables.starts[1:-1])
-    brakes = len(model.controls.rows) > 0
-    for row in drive.rows[np.isin(drive.rows[:, KIND], (MOTOR, BRAKE))]:
-        torques = points[row[TABLE]]
-        brakes = brakes or bool(torques.any() if row[KIND] == BRAKE else torques.min() < 0.0)
-    return 0.0 if brakes else min((points[row[SPEED]].min() for row in drive.control), default=math.inf)
 
 
 def drive_links(model):

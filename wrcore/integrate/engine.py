@@ -188,14 +188,14 @@ def take_samples(control, memory, scratch, equations, model, work):
     """Take the samples of control laws that are due, and adapt the next step to the time of the next sample.
 
     The next step, or the one after it, ends at the next sample (fixed steps are not changed)."""
-    if model.samples == 0:
+    if model.kernels.control_samples_kernel == 0:
         return
     clock, sampling = memory.clock, work.control.sampling
-    call_address(model.samples, model, clock[T], memory.state, work, False)
+    call_address(model.kernels.control_samples_kernel, model, clock[T], memory.state, work, False)
     if sampling[DUE] > 0.0:
         derivatives_at(equations, clock[T], memory.state, model, work, scratch.slope, WARM)
         memory.counters[EVALUATIONS] += 1
-        call_address(model.samples, model, clock[T], memory.state, work, True)
+        call_address(model.kernels.control_samples_kernel, model, clock[T], memory.state, work, True)
         memory.counters[HAS_RATE] = 0
     left = sampling[NEXT_SAMPLE] - clock[T]
     if control.fixed_step == 0.0 and clock[NEXT] > 0.5 * left:
@@ -205,8 +205,8 @@ def take_samples(control, memory, scratch, equations, model, work):
 @jit(allocates=False)
 def keep_short(control, memory, model, work):
     """Shorten the next step where rails change along the track and near check rails (fixed steps are not changed)."""
-    if model.strides != 0 and control.fixed_step == 0.0:
-        call_address(model.strides, model, memory.state, work, memory.clock, NEXT)
+    if model.kernels.step_limit_kernel != 0 and control.fixed_step == 0.0:
+        call_address(model.kernels.step_limit_kernel, model, memory.state, work, memory.clock, NEXT)
 
 
 @jit(allocates=False)

@@ -177,9 +177,10 @@ def new_jacobian(equations):
     _, model, work = equations.arguments
     jacobian = _empty_jacobian(model.value)
     by_hand = _slopes_by_hand(model.value.contact)
-    if (by_hand is not None) != (model.value.slopes != 0):
-        slopes = Kernel(by_hand, jacobian, model, work).address if by_hand else 0
-        model.lay(model.value._replace(slopes=slopes))
+    kernels = model.value.kernels
+    if (by_hand is not None) != (kernels.contact_derivatives_kernel != 0):
+        kernel = Kernel(by_hand, jacobian, model, work).address if by_hand else 0
+        model.lay(model.value._replace(kernels=kernels._replace(contact_derivatives_kernel=kernel)))
     return jacobian
 
 

@@ -79,7 +79,7 @@ def _accelerations(t, state, model, work, body, direction, out):
         for i in range(3):
             wrenches[body, direction - direction % 3 + i] = UNIT * work.rotations[body, i, direction % 3]
     if model.joints.equations > 0:
-        call_address(model.reactions, model, t, state, work)
+        call_address(model.kernels.joint_reactions_kernel, model, t, state, work)
     for b in range(bodies.mass.shape[0]):
         for i in range(3):
             out[6 * b + i] = wrenches[b, i] / bodies.mass[b]
@@ -218,8 +218,8 @@ def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
             copy_into(base[k, wheel], work.motions[k, wheel])
     columns[:] = 0.0
     jacobian.counts[:] = UNCOUNTED
-    if model.slopes != 0:
-        call_address(model.slopes, jacobian, model, work)
+    if model.kernels.contact_derivatives_kernel != 0:
+        call_address(model.kernels.contact_derivatives_kernel, jacobian, model, work)
     for k in range(wheelsets.shape[0]):
         if jacobian.counts[k, 0] == UNCOUNTED or jacobian.counts[k, 1] == UNCOUNTED:
             _difference_wrenches(jacobian, model, work, fine)
@@ -227,7 +227,7 @@ def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
     for k in range(wheelsets.shape[0] if model.flexible_track.mass.shape[0] > 0 else 0):
         for wheel in range(2):
             give_way(model.flexible_track, wheel, jacobian.slopes[k, wheel])
-    if model.guards != 0:
+    if model.kernels.check_rails_kernel != 0:
         _difference_check_rails(jacobian, state, model, work, fine)
     add_slopes(jacobian, state, model, columns)
 
@@ -323,7 +323,7 @@ def _difference_check_rails(jacobian, state, model, work, fine):
         difference = 0.0 if j < 0 else _difference(j, fine)
         _move_all(jacobian.motions, max(j, 0), difference, work)
         work.rail_wrenches[:] = 0.0
-        call_address(model.guards, model, state, work)
+        call_address(model.kernels.check_rails_kernel, model, state, work)
         for k in range(work.motions.shape[0]):
             for wheel in range(2):
                 if j < 0:

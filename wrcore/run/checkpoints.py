@@ -67,8 +67,8 @@ def _read(group, kind):
 
 def model_fingerprint(model: Model) -> str:
     """Return the SHA-256 digest (hex) of all numbers of a compiled model."""
-    contact = model.contact._replace(creep=model.contact.creep._replace(own=0))  # an address of this process only
-    return digest_of(model._replace(contact=contact)).hexdigest()
+    creep = model.contact.creep._replace(own_kernel=0)  # an address of this process only
+    return digest_of(model._replace(contact=model.contact._replace(creep=creep))).hexdigest()
 
 
 def digest_of(parts, *texts: str):

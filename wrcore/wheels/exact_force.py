@@ -173,8 +173,8 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
                 work.spare[0] = 0.0
                 call_address(
-                    contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
-                    work,
+                    contact.strips.patch_forces_kernel, contact, m, spatial, rows, first, last, work.out, wrench,
+                    counters, memory, work,
                 )  # fmt: skip
                 if rough and work.out[reduction.NORMAL] < 0.0:
                     _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, ELLIPSES)

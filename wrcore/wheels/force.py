@@ -13,8 +13,8 @@ from wrcore.wheels.motion import WheelMotion
 def press_wheels(model, work, mode):
     """Compute forces and moments of the rails on all wheels from the motions in ``work``, by the model's kernel."""
     call_address(
-        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips, mode,
+        model.kernels.wheel_forces_kernel, model.contact, work.motions, work.patches, work.counts, work.bounds,
+        work.rail_wrenches, work.counters, work.strips, mode,
     )  # fmt: skip
 
 

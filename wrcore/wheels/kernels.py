@@ -29,11 +29,11 @@ from wrcore.wheels.table_force_apart import look_lobes_up
 def with_fallback(contact):
     """Return the contact model with the address of the grid solver, which is used if strips do not converge."""
     m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
-    fallback = Kernel(
+    solver = Kernel(
         solve_on_grid, Kind(without_wheels(contact)), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
         np.zeros(PATCH_COLUMNS),
     )  # fmt: skip
-    return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
+    return contact._replace(strips=contact.strips._replace(grid_kernel=solver.address))
 
 
 def with_groups(contact, work):
@@ -41,7 +41,7 @@ def with_groups(contact, work):
     looked_up = contact.strips.looked_up > 0.0
     contact = contact if looked_up else with_fallback(contact)
     group = _of_patches(add_tabulated if looked_up else add_group, contact, work)
-    return contact._replace(strips=contact.strips._replace(group=group))
+    return contact._replace(strips=contact.strips._replace(patch_forces_kernel=group))
 
 
 def with_late(contact):

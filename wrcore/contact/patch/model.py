@@ -79,11 +79,11 @@ class StripModel(NamedTuple):
     """Libraries for 1, 3/2 and 2 times the usual number of strips, for windows of increasing width."""
     slender: Library
     """Library for slender patches."""
-    fallback: int = 0
-    """Address of the kernel that solves a patch on a grid."""
+    grid_kernel: int = 0
+    """Address of the kernel that solves a patch on a grid if strips do not converge."""
     table: PairTable = NO_TABLE
-    group: int = 0
-    """Address of the kernel that adds the wrench on a patch, from the table or from a solution."""
+    patch_forces_kernel: int = 0
+    """Address of the kernel that adds force and moment of a patch, from the table or from a solution."""
     late: np.ndarray = np.zeros(5, np.int64)
     """Addresses; the first four are 0 until they are needed. KERNEL: kernel that solves a patch outside the table;
     MODEL: its model; ELLIPSES: the kernel with ellipses in its place; LOBES: the kernel for separate sub-patches; LOAD:

@@ -230,7 +230,7 @@ def roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 
     The forces act on one strip at the pressure's centroid. ``row`` is overwritten."""
     strips, slip, force = work.strips, work.slip, work.friction
-    call_address(model.strips.fallback, model, m, pose, frame, creepage, friction, row)
+    call_address(model.strips.grid_kernel, model, m, pose, frame, creepage, friction, row)
     (xi, eta, phi), x, s, load = creepage, row[reduction.X], row[reduction.Y], row[reduction.NORMAL]
     strips[solve.CENTRE, 0], strips[solve.MIDDLE, 0], strips[solve.WHEEL_HEIGHT, 0] = s, x, -depth
     strips[solve.STRIP_TILT, 0], strips[solve.STRIP_LOAD, 0] = row[reduction.ANGLE], load
