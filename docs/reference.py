@@ -8,7 +8,7 @@ from importlib.resources import files
 import yaml
 
 import wrcore
-from wrcore.errors.checked_yaml import kinds_in
+from wrcore.errors.schema_keys import kinds_in
 
 GROUPS = {
     "Scenes and runs": (

@@ -1,6 +1,7 @@
 """The house: a room of the core imports only from rooms before it, no circle of files, nothing from the study."""
 
 import ast
+from collections import Counter
 from pathlib import Path
 
 from tests.conftest import ROOT
@@ -100,6 +101,15 @@ def test_the_core_shows_its_rooms_and_nothing_else():
     assert {name.removesuffix(".pyi").removesuffix(".py") for name in entries} == {
         *ROOMS, "__init__", "__main__", "py.typed"
     }  # fmt: skip
+
+
+def test_files_and_folders_of_the_core_are_short():
+    """At most 400 lines in a file, 16 modules in a folder."""
+    paths = sorted((ROOT / "wrcore").rglob("*.py"))
+    lengths = {path.relative_to(ROOT).as_posix(): len(path.read_text("utf-8").splitlines()) for path in paths}
+    assert not {name: length for name, length in lengths.items() if length > 400}
+    counts = Counter(path.parent.relative_to(ROOT).as_posix() for path in paths)
+    assert not {name: count for name, count in counts.items() if count > 16}
 
 
 def test_every_question_has_its_drawers():

@@ -19,7 +19,8 @@ from tests.conftest import ELLIPTIC, SCENES
 from tests.equations.test_energy import EVERYTHING
 from wrcore.creep.table import ensure_table
 from wrcore.errors import InputError
-from wrcore.errors.checked_yaml import _schema, keys_of, read_yaml
+from wrcore.errors.checked_yaml import read_yaml, schema_of
+from wrcore.errors.schema_keys import keys_of
 from wrcore.forces.kinds import KINDS
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.run import simulation
@@ -344,7 +345,7 @@ SCENE_KEYS = [key for key in leaves("scene") if not key.startswith(STATE) and RO
 @pytest.mark.parametrize("key", [key for key in SCENE_KEYS if key not in ELSEWHERE])
 def test_scene_key_changes_the_model(key, record, names):
     special = SPECIAL | {"contact.creep.table": [names["another"]]}
-    assert has_effect(key, scene_bases(names), record, _schema("scene"), special)
+    assert has_effect(key, scene_bases(names), record, schema_of("scene"), special)
 
 
 @pytest.mark.parametrize("key", [key for key in leaves("scene") if ROUND_KEY in key])
@@ -359,7 +360,7 @@ def test_key_of_a_wheel_out_of_round_changes_its_shape(key, names):
     def record(changes):
         return pickle.dumps(load_scene(names["scene"], changes).out_of_round)
 
-    assert has_effect(key, bases, record, _schema("scene"), special)
+    assert has_effect(key, bases, record, schema_of("scene"), special)
 
 
 @pytest.fixture
@@ -403,7 +404,7 @@ def test_key_of_the_run_reaches_the_integration(key, names, begun):
         return begun(changes)
 
     special = {"output.channels": [["pose", "contact"]], "integration.method": ["rodas5"]}
-    assert has_effect(key, bases, record, _schema("scene"), special)
+    assert has_effect(key, bases, record, schema_of("scene"), special)
 
 
 @pytest.mark.parametrize("body", ["car_body", "bogie_1"])
@@ -451,7 +452,7 @@ def test_track_key_changes_the_model(key, record, names):
             return pickle.dumps((scene.crossings, scene.corrugation))
         return record(changes)
 
-    assert has_effect(key, track_bases(names), of_track, _schema("track"), special)
+    assert has_effect(key, track_bases(names), of_track, schema_of("track"), special)
 
 
 # ---------------------------------------------------------------------------------------------------------- vehicles
@@ -504,7 +505,7 @@ def test_vehicle_key_changes_the_bodies_or_joints(key):
     }  # fmt: skip
     if key == "bodies.*.wheelset":
         special["bodies.*.wheelset"] = [f"wheelset_{k}" for k in range(1, 5)]
-    assert has_effect(key, vehicle_bases(), made, _schema("vehicle"), special)
+    assert has_effect(key, vehicle_bases(), made, schema_of("vehicle"), special)
 
 
 AIR = {
@@ -600,4 +601,4 @@ def test_sweep_key_changes_the_runs_or_the_table(key):
             return wr.run_sweep(sweep).to_csv()
         return sweep.runs.to_csv(), sweep.batches, sweep.scene.data["integration"], sweep.scene.data["name"]
 
-    assert has_effect(key, sweep_bases(), record, _schema("sweep"), special)
+    assert has_effect(key, sweep_bases(), record, schema_of("sweep"), special)

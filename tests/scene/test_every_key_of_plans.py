@@ -18,7 +18,7 @@ from wrcore.analysis.wear import evolve as ev
 from wrcore.analysis.wear.local_wear import WheelWear, friction_work
 from wrcore.analysis.wear.wear_laws import Sliding, wear_law
 from wrcore.analysis.wear.worn_profiles import flange
-from wrcore.errors.checked_yaml import _schema
+from wrcore.errors.checked_yaml import schema_of
 from wrcore.geometry.profiles.standards import named_profile
 from wrcore.geometry.track import SIDES
 
@@ -98,7 +98,7 @@ def test_key_of_a_wear_plan_changes_the_worn_profiles(key, worn):
         "scenes[].set": [{"integration.duration": 0.6, "speed": 31}],
         "limits.Sh": [0.09], "limits.hollow": [0.09], "limits.Sd": [0.005], "limits.qR": [0.005],
     }  # fmt: skip
-    assert has_effect(key, plan_bases(), worn, _schema("wear"), special)
+    assert has_effect(key, plan_bases(), worn, schema_of("wear"), special)
 
 
 @pytest.fixture(scope="module")
@@ -126,4 +126,4 @@ def test_key_of_a_wear_law_changes_what_it_takes_off(key, sliding):
     def record(law):
         return wear_law(law)(sliding).tobytes()
 
-    assert has_effect(key, LAWS, record, _schema("wear_law"), special)
+    assert has_effect(key, LAWS, record, schema_of("wear_law"), special)

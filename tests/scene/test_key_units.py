@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from wrcore.cli import main
-from wrcore.errors.checked_yaml import _schema, _unit, keys_of, unit_of_key
+from wrcore.errors.checked_yaml import schema_of
+from wrcore.errors.schema_keys import _unit, keys_of, unit_of_key
 from wrcore.forces.kinds import KINDS
 from wrcore.run.output.channels import UNIT_SUFFIXES
 from wrcore.sweep.batch import column_unit, write_table
@@ -47,7 +48,7 @@ def named_parts(part, path=""):
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_every_number_has_a_unit(name):
-    units = {path: _unit(part) for path, part in named_parts(_schema(name)) if has_numbers(part)}
+    units = {path: _unit(part) for path, part in named_parts(schema_of(name)) if has_numbers(part)}
     assert len(units) >= 3 and {path: unit for path, unit in units.items() if unit not in KNOWN} == {}
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
-from wrcore.errors.checked_yaml import _schema, parse_value, read_yaml
+from wrcore.errors.checked_yaml import parse_value, read_yaml, schema_of
 from wrcore.scene.compile import compile_scene
 
 TEXT = (ROOT / "reports" / "scenes.md").read_text(encoding="utf-8")
@@ -32,8 +32,8 @@ def test_each_block_is_a_part_of_a_scene_that_runs(block):
 
 
 def test_each_key_is_in_the_report():
-    drive = _schema("scene")["properties"]["drive"]["properties"]
-    initial = _schema("scene")["properties"]["initial"]["properties"]
+    drive = schema_of("scene")["properties"]["drive"]["properties"]
+    initial = schema_of("scene")["properties"]["initial"]["properties"]
     keys = {
         *initial,
         "k_A",

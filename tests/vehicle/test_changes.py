@@ -8,7 +8,8 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, ROOT
-from wrcore.errors.checked_yaml import parse_value, unit_of_key
+from wrcore.errors.checked_yaml import parse_value
+from wrcore.errors.schema_keys import unit_of_key
 
 TRAILER, VEHICLE = ELLIPTIC / "trailer_vehicle.yaml", ROOT / "config/vehicles/trailer_vehicle.yaml"
 

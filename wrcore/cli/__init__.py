@@ -12,26 +12,10 @@ from contextlib import suppress
 from signal import SIGPIPE
 
 from wrcore import __version__
-from wrcore.cli import (
-    assess,
-    compare,
-    conicity,
-    contact,
-    creep,
-    curving,
-    draw,
-    evolve,
-    fmu,
-    init,
-    keys,
-    profiles,
-    response,
-    simulate,
-    sweep,
-    table,
-)
+from wrcore.cli import assess, compare, curving, draw, evolve, fmu, init, keys, response, simulate, sweep
 from wrcore.cli.common.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
+from wrcore.cli.wheel_and_rail import conicity, contact, creep, profiles, table
 from wrcore.errors import InputError
 from wrcore.reporting import command as report
 

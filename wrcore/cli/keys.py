@@ -3,7 +3,7 @@
 import textwrap
 
 from wrcore.errors import InputError, similar
-from wrcore.errors.checked_yaml import keys_of
+from wrcore.errors.schema_keys import keys_of
 
 KINDS = ("scene", "track", "vehicle", "sweep", "wear")
 

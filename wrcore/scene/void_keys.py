@@ -12,8 +12,8 @@ from wrcore.contact.patch.model import STRIPS
 from wrcore.contact.search.reduction import REDUCTIONS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors import InputError, short
-from wrcore.errors.checked_yaml import keys_of
 from wrcore.errors.messages import tell
+from wrcore.errors.schema_keys import keys_of
 
 
 class VoidKey(NamedTuple):

@@ -29,9 +29,9 @@ from wrcore.equations.many_models import equations_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.errors.checked_yaml import unit_of_key
 from wrcore.errors.input_files import check_regular, check_unchanged
 from wrcore.errors.new_files import appearing, held, remove_folder, remove_remains
+from wrcore.errors.schema_keys import unit_of_key
 from wrcore.run.output.channels import unit_of
 from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times

@@ -18,7 +18,7 @@ from tests.synthetic import hunting_run
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main
-from wrcore.errors.checked_yaml import _schema
+from wrcore.errors.checked_yaml import schema_of
 from wrcore.forces import kinds as elements
 
 VEHICLES = sorted(path.stem for path in ELLIPTIC.glob("*.yaml"))
@@ -42,7 +42,7 @@ def test_a_drawing_holds_everything_of_the_vehicle_file_in_both_views(name, tmp_
     assert all(item["name"] in texts for item in data.get("elements", []) + data.get("joints", []))
 
 
-KINDS = _schema("vehicle")["properties"]
+KINDS = schema_of("vehicle")["properties"]
 ELEMENTS = {
     "spring_damper": {"stiffness": [1e5, 1e5, 1e5]}, "bushing": {"stiffness": [1e5, 1e5, 1e5]},
     "shear_spring": {"stiffness": [1e5, 1e5, 1e6]}, "air_spring": {"effective_area": 0.2, "volume": 0.05},

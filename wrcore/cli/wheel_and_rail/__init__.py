@@ -1,0 +1,1 @@
+"""Commands about profiles, contact and creep forces, without a simulation."""
