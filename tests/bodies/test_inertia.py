@@ -9,11 +9,12 @@ from scipy.linalg import expm
 
 from tests.bodies.test_body import matrix_of
 from tests.conftest import ELLIPTIC
+from tests.energy_balance import energy_balance
 from tests.equations.test_equations_of_motion import body_state, contact, make_model, run  # noqa: F401
 from tests.vehicle.conftest import TRAILER
 from wrcore.bodies.body import STATE_SIZE, euler_of
 from wrcore.bodies.inertia import inertia_tensors, principal, tensor_of
-from wrcore.equations.energy import energy_balance, energy_channels
+from wrcore.equations.energy import energy_channels
 from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate

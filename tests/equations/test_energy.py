@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC
+from tests.energy_balance import energy_balance
 from tests.equations.test_equations_of_motion import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from tests.forces.test_suspension import CONSERVATIVE, MASSES, energy_of, model_with, momenta
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.bodies.marker import FRAME
 from wrcore.contact.search import reduction
-from wrcore.equations.energy import CHANNELS, energy_balance, energy_channels
+from wrcore.equations.energy import CHANNELS, energy_channels
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.model import workspace
 from wrcore.geometry.track import build_track

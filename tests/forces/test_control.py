@@ -5,7 +5,7 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
-from wrcore.equations.energy import energy_balance
+from tests.energy_balance import energy_balance
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.run.checkpoints import model_fingerprint

@@ -7,8 +7,8 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, SCENES
+from tests.energy_balance import energy_balance
 from tests.equations.test_equations_of_motion import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
-from wrcore.equations.energy import energy_balance
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.many_models import with_kernels_of
 from wrcore.equations.model import state_size

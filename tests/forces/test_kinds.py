@@ -13,10 +13,11 @@ from numba import njit
 
 import wrcore as wr
 from tests.conftest import ELLIPTIC, ROOT
+from tests.energy_balance import energy_balance
 from tests.equations.test_equations_of_motion import body_state, contact, run  # noqa: F401 (contact is a fixture)
 from tests.forces import own_laws
 from tests.forces.test_suspension import at_rest, evaluate, model_with, moving
-from wrcore.equations.energy import energy_balance, energy_channels
+from wrcore.equations.energy import energy_channels
 from wrcore.equations.model import workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import GIVEN, read_yaml

@@ -7,12 +7,12 @@ import pytest
 from scipy.linalg import expm
 
 from tests.conftest import ELLIPTIC
+from tests.energy_balance import energy_balance
 from tests.jacobian import test_jacobian as jacobian_tests
 from tests.track.giving_track import EXAMPLES
 from wrcore.analysis.stability.stability import modes
 from wrcore.bodies.body import STATE_SIZE
 from wrcore.contact.search.reduction import ETA, Y, Z
-from wrcore.equations.energy import energy_balance
 from wrcore.equations.equations_of_motion import Equations
 from wrcore.equations.model import internal_states
 from wrcore.errors import InputError

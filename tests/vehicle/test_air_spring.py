@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.energy_balance import energy_balance
 from tests.vehicle.conftest import element
-from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.forces.law import FIRST, LAST, NUMBERS
 from wrcore.run.simulate import simulate

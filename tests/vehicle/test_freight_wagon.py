@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC, ROOT
-from wrcore.equations.energy import energy_balance
+from tests.energy_balance import energy_balance
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.forces.law import INNER, NUMBERS, PRESSING_SPRING
 from wrcore.run.simulate import simulate

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import ELLIPTIC
+from tests.energy_balance import energy_balance
 from wrcore.balance.linear import steady_running
-from wrcore.equations.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
 from wrcore.scene.compile import compile_scene

@@ -17,8 +17,6 @@ rate of delta. Along a profile both hold only approximately; the last term is th
 power of the normal forces remains; without contact damping as well, that of Hertzian normal forces remains.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wrcore.bodies.body import OMEGA, STATE_SIZE, VELOCITY
@@ -43,18 +41,6 @@ CHANNELS = (
 
 DRIVE_CHANNELS = ("input_by_motors_W", "dissipated_by_brakes_W")
 """Names of further channels of scenes with motors or brakes."""
-
-
-class EnergyBalance(NamedTuple):
-    """Energy balance of a run over time; all arrays have shape (n,)."""
-
-    turned_over: np.ndarray
-    """Energy exchanged between stores, sources and sinks: half the integral of the sum of |powers|, J."""
-    imbalance: np.ndarray
-    """Error of the balance: change of the stores plus losses minus inputs, J. The contact's store is integrated from
-    its power."""
-    contact_remainder: np.ndarray
-    """Change of 2/5 N_el delta minus the integral of the power of the elastic contact forces, J."""
 
 
 @jit(inline="always")
@@ -210,24 +196,3 @@ def _drive_powers(model, work, times, states):
     torques, rates, *_ = drive_history(Equations(model, work), times, states)
     powers, brakes = torques * rates, model.drive.rows[:, KIND] == BRAKE
     return dict(zip(DRIVE_CHANNELS, (powers[:, ~brakes].sum(axis=1), -powers[:, brakes].sum(axis=1)), strict=True))
-
-
-def energy_balance(channels, times):
-    """Compute the `EnergyBalance` of a run from its `energy_channels` by Simpson's rule.
-
-    Output times (s) are uniform and must resolve the fastest changes of the powers."""
-    from scipy.integrate import cumulative_simpson  # its import takes longer than most runs
-
-    def gone(name):
-        return cumulative_simpson(channels[name], x=times, initial=0.0)
-
-    stores = sum(channels[name] - channels[name][0] for name in ("kinetic_J", "gravitational_J", "springs_J"))
-    losses = sum(gone(name) for name in channels if name.startswith("dissipated"))
-    inputs = sum(gone(name) for name in channels if name.startswith("input"))
-    contact = gone("stored_by_elastic_contact_W")
-    names = [name for name in channels if name.endswith("_W")]
-    powers = np.array([channels[name] for name in names])
-    kinetic = np.array([1.0 if name.startswith("input") else -1.0 for name in names]) @ powers
-    turned_over = 0.5 * cumulative_simpson(np.abs(powers).sum(axis=0) + np.abs(kinetic), x=times, initial=0.0)
-    remainder = channels["elastic_contact_J"] - channels["elastic_contact_J"][0] - contact
-    return EnergyBalance(turned_over, stores + contact + losses - inputs, remainder)
