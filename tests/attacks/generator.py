@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from wrcore.cli import parser
+from wrcore.errors import checked_yaml
 from wrcore.errors.checked_hdf5 import sign
-from wrcore.errors.checked_yaml import _schema, kinds_in
+from wrcore.errors.schema_keys import kinds_in
 
 
 def examples(count):
@@ -55,7 +56,7 @@ junk = st.recursive(
 
 def schema_of(kind):
     """Return a schema of the package; that of a scene with those of its track and vehicle inside."""
-    schema = copy.deepcopy(_schema(kind))
+    schema = copy.deepcopy(checked_yaml.schema_of(kind))
     if kind == "scene":
         inside = schema["properties"]
         inside["track"], inside["vehicle"]["properties"]["parameters"] = schema_of("track"), schema_of("vehicle")

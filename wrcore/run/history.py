@@ -31,8 +31,8 @@ class History:
     """
 
     def __init__(self, rate: float, is_kept: bool) -> None:
-        self.rate, self.is_kept, self.entries = rate, is_kept, None
-        self.entries: Any
+        self.rate, self.is_kept = rate, is_kept
+        self.entries: Any = None
 
     @property
     def last(self) -> Entry:
