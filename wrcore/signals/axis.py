@@ -93,6 +93,9 @@ def _values(table, k, given):
 
 
 def _metres(cell, table, row):
+    """Return the distance (m) of a chainage such as 12+450, NaN for an empty cell."""
+    if cell is None or cell != cell:
+        return np.nan
     parts = _CHAINAGE.fullmatch(str(cell).strip())
     if not parts:
         raise InputError(table.path, table.where(row), f"expected a chainage such as 12+450, got {str(cell)[:40]!r}")
@@ -113,7 +116,7 @@ def _seconds(column, table, k):
         times = (dated - dated.iloc[0]).dt.total_seconds().to_numpy()
     if not np.isfinite(times).any():
         raise InputError(table.path, table.titles[k], f"expected times such as 12:34:56.789, got {texts.iloc[0]!r}")
-    return times - times[0]
+    return times - times[np.isfinite(times)][0]
 
 
 def _check_count(rows, path):

@@ -52,12 +52,14 @@ def read_mat_table(path) -> MeasuredTable:
 
 
 def _is_version_5(path):
+    """Whether a file begins with the header of MATLAB 5; files of version 4 have none."""
     with open(path, "rb") as file:
         head = file.read(128)
     return head.startswith(b"MATLAB") or head[126:128] in (b"IM", b"MI")
 
 
 def _read_mat4(path):
+    """Return the arrays of a file of version 4 by name."""
     from scipy.io import loadmat
 
     with np.errstate(all="ignore"):

@@ -24,7 +24,7 @@ class MeasuredTable:
     titles: list[str]
     """Titles of the columns as in the file."""
     units: list[str]
-    """Units that the file states apart from the titles; empty texts where it states none."""
+    """Units that the file states in a line or attribute of their own; empty texts where it states none."""
     columns: list[np.ndarray]
     """Values of each column; all have the same length."""
     rate: float = 0.0
@@ -71,27 +71,25 @@ class MeasuredTable:
         return np.array([float(cell) if _is_number(str(cell)) else np.nan for cell in column])
 
     def channels(
-        self, wanted: Mapping[str, str] | None, units: Mapping[str, str], without: int | None
+        self, wanted: Mapping[str, str] | None, units: Mapping[str, str], axis_column: int | None
     ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         """Return channels in SI units and their units, both by name.
 
         ``wanted`` maps titles to channels, a minus before the channel reverses the sign; None: all columns of numbers
-        but the one with index ``without``, under names made of their titles. ``units`` are units by title that replace
+        but the ``axis_column``, under names made of their titles. ``units`` are units by title that replace
         those of the file. An InputError names a column whose unit is missing or cannot be that of its channel."""
         given = {self.index(title, "units"): unit for title, unit in units.items()}
         for title, unit in units.items():
             if not plain_unit(unit):
-                raise InputError(
-                    self.path, f"units {title}", f"expected a unit such as mm, kN, g or m/s2, got {unit!r}"
-                )
+                expected = f"expected a unit such as mm, kN, g or m/s2, got {unit!r}"
+                raise InputError(self.path, f"units {title}", expected)
         if wanted is None:
-            return self._all_channels(given, without)
+            return self._all_channels(given, axis_column)
         values, si = {}, {}
         for title, channel in wanted.items():
             k, sign, channel = self.index(title, "channels"), -1.0 if channel[:1] == "-" else 1.0, channel.lstrip("-")
             name, unit = self.name_and_unit(k)
-            unit = given.get(k, unit) or (channel if _is_pure(channel) else "")
-            unit = "1" if unit == channel else unit
+            unit = given.get(k, unit) or ("1" if is_of_channel("1", channel) else "")
             if not is_of_channel(unit, channel):
                 got = f"a unit of {channel}, got {unit!r}" if unit else f"its unit, for {channel}"
                 raise InputError(self.path, self.titles[k], f"expected {got}; units={{{name!r}: 'mm'}} states one")
@@ -101,10 +99,10 @@ class MeasuredTable:
             si[channel] = _si(unit)
         return values, si
 
-    def _all_channels(self, given, without):
+    def _all_channels(self, given, axis_column):
         values, si = {}, {}
         for k, column in enumerate(self.columns):
-            if k == without or column.dtype.kind not in "fiub" or not np.isfinite(column.astype(float)).any():
+            if k == axis_column or column.dtype.kind not in "fiub" or not np.isfinite(column.astype(float)).any():
                 continue
             name, unit = self.name_and_unit(k)
             unit = given.get(k, unit)
@@ -119,10 +117,6 @@ class MeasuredTable:
 def _compared(text):
     """Return a title as titles are compared: in lower case, with blanks for underscores."""
     return text.strip().lower().replace("_", " ")
-
-
-def _is_pure(channel):
-    return is_of_channel("1", channel)
 
 
 def _si(unit):

@@ -41,6 +41,7 @@ _STEP = re.compile(
     rf"(?:(?:sampl\w*|abtast\w*)[ _-]*(?:interval\w*|period|time|zeit)|abtastintervall|\bdt\b|\bdelta ?t\b){_VALUE}"
     r"(ms|us|µs|s)?\b", re.I,
 )  # fmt: skip
+"""Sampling rate or sampling interval in a header line: its name, value and unit."""
 
 
 def read_text_table(path) -> MeasuredTable:
@@ -54,15 +55,12 @@ def read_text_table(path) -> MeasuredTable:
         rows = rows[1:]
     else:
         separator = _find_separator([line for _, line in rows], path)
-    rows = [(k, line if separator == " " else line.rstrip("\r\n")) for k, line in rows]
     begin, count = _first_row(rows, separator, path)
     titles, units, others = _header(rows[:begin], separator, count)
     body = [(k, line) for k, line in rows[begin:] if not line.lstrip().startswith(("#", "%", "//"))]
     body = _without_cut_line(body, separator, count, text, path)
     columns = _columns(body, separator, count, path)
-    if len(titles) > len(columns) or not titles:
-        titles = titles[: len(columns)] or [f"column {k + 1}" for k in range(len(columns))]
-    titles += [f"column {k + 1}" for k in range(len(titles), len(columns))]
+    titles = titles[: len(columns)] + [f"column {k + 1}" for k in range(len(titles), len(columns))]
     units = (units + [""] * len(columns))[: len(columns)]
     return MeasuredTable(str(path), titles, units, columns, _rate(others), [k for k, _ in body])
 
@@ -90,26 +88,25 @@ def _sample(lines):
 
 def _find_separator(lines, path):
     """Return the separator with which most rows have equally many cells that are values."""
-    best, found = (0.0, 0), ""
+    best, found = 0.0, ""
     for separator in SEPARATORS:
         rows = [_values_in(line, separator) for line in _sample(lines)]
-        usual, number = Counter(rows).most_common(1)[0] if rows else ((0, 0), 0)
-        n_values, n_cells = usual
-        share = number / max(len(rows), 1) * (n_values / max(n_cells, 1))
-        if n_values and n_cells > 1 and (round(share, 1), 0) > best:
-            best, found = (round(share, 1), 0), separator
+        (n_values, n_cells), n_rows = Counter(rows).most_common(1)[0] if rows else ((0, 0), 0)
+        share = round(n_rows * n_values / max(len(rows) * n_cells, 1), 1)
+        if n_cells > 1 and share > best:
+            best, found = share, separator
     if found == "," and _are_decimal_commas(lines):
         return ";"
     if not found and any(_is_value(line.strip().strip('"')) for line in _sample(lines)):
         return ";"  # a single column
     if not found:
-        raise InputError(
-            path, "", f"expected {EXPECTED}, got {'a text without rows of numbers' if lines else 'no lines'}"
-        )
+        got = "a text without rows of numbers" if lines else "no lines"
+        raise InputError(path, "", f"expected {EXPECTED}, got {got}")
     return found
 
 
 def _values_in(line, separator):
+    """Return the number of cells of a line that are values, and the number of cells."""
     cells = split(line, separator)
     return sum(map(_is_value, cells)), len(cells)
 
@@ -165,6 +162,7 @@ def _title_cells(line, separator, count):
 
 
 def _may_be_titles(cells, count):
+    """Whether a header line has as many cells as the rows, one more or one less, and a letter."""
     filled = [cell for cell in cells if cell]
     return count <= len(cells) + (len(cells) > 1) and len(cells) <= count + 1 and any(map(_has_letter, filled))
 

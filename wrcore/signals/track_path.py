@@ -151,9 +151,9 @@ def _at_knots(x, values, knots):
         return np.bincount(at, weights, count)
 
     diagonal = sums((1.0 - share) ** 2, k) + sums(share**2, k + 1) + 1e-9
-    beside = sums(share * (1.0 - share), k)
+    off_diagonal = sums(share * (1.0 - share), k)
     right = sums((1.0 - share) * values, k) + sums(share * values, k + 1)
-    return solveh_banded(np.stack([diagonal, beside]), right, lower=True)
+    return solveh_banded(np.stack([diagonal, off_diagonal]), right, lower=True)
 
 
 def _merged(x, values, knots, tolerance, shortest):

@@ -94,8 +94,8 @@ def fit(
     problem = _Problem(load_scene(scene), keys, signals, band, noise or {}, threads, progress)
     begin = problem.start(start or {})
     found, jacobian, residuals = _search(problem, begin, most_steps)
-    tau = float(np.mean([correlation_time_of(residuals[part]) for part in problem.parts(residuals)]))
-    covariance = covariance_of(jacobian, residuals, tau)
+    correlation_time = float(np.mean([correlation_time_of(residuals[part]) for part in problem.parts()]))
+    covariance = covariance_of(jacobian, residuals, correlation_time)
     warnings = warnings_of(problem.names, found.x, covariance, jacobian)
     for text in warnings:
         warn(f"fit: {text}")
@@ -191,6 +191,7 @@ class _Problem:
             self.weights.append(weights)
 
     def _residuals_of(self, runs):
+        """Return the weighted differences (m,) of the runs of all signals, `ABSENT` where a run has ended early."""
         parts = []
         for run, signal, weights in zip(runs, self.measured, self.weights, strict=True):
             on_grid = _on_grid_of(run, signal, self.band)
@@ -200,7 +201,7 @@ class _Problem:
                 parts.append(np.where(np.isfinite(difference), difference, ABSENT))
         return np.concatenate(parts)
 
-    def parts(self, residuals):
+    def parts(self):
         """Return slices of the residuals, one for each channel of each signal."""
         counts = [np.count_nonzero(np.isfinite(signal[channel])) for signal in self.measured for channel in signal]
         edges = np.cumsum([0, *counts])
