@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from study.report.legible import findings
 from tests.synthetic import hunting_run
+from wrcore.analysis.legible import findings
 from wrcore.cli import main
 
 

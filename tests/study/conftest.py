@@ -3,7 +3,7 @@
 import pytest
 from matplotlib.figure import Figure
 
-from study.report.legible import findings
+from wrcore.analysis.legible import findings
 
 
 @pytest.fixture(autouse=True)

@@ -297,7 +297,7 @@ SCENE = ("vehicle", "balance", "scene")
 RUN = (*CONTACT, *FORCES, "integrate", *SCENE, "run")
 VEHICLE = ("analysis/assessment/wheels",)
 LOADED = (*CONTACT, *FORCES, "analysis/contact/loaded", "analysis/contact/poses")
-STYLE = ("analysis/pictures/style", "study/report/legible")
+STYLE = ("analysis/pictures/style", "analysis/legible")
 CORE = {
     "creep": sources("kernels", "creep", "contact/rolling"),
     "creep_study": sources("kernels", "creep", "contact/rolling", "study/creep/laws", "analysis/creep_curves"),

@@ -7,7 +7,6 @@ import pytest
 from scipy import signal
 
 import wrcore as wr
-from study.report.legible import findings
 from tests.synthetic import CONTACT
 from wrcore.analysis.assessment.assess import (
     assess,
@@ -18,6 +17,7 @@ from wrcore.analysis.assessment.assess import (
     track_sections,
 )
 from wrcore.analysis.assessment.wheels import output_times_after
+from wrcore.analysis.legible import findings
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.output.run import Run

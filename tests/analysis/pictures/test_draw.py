@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 import wrcore as wr
-from study.report.legible import findings
 from tests.conftest import ELLIPTIC, ROOT, SCENES
 from tests.synthetic import hunting_run
+from wrcore.analysis.legible import findings
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main

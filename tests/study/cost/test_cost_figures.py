@@ -6,7 +6,7 @@ import pytest
 
 from study.cost.figures import STAGE_COLOURS, fig_breakdown, fig_growth
 from study.cost.operations import STAGES
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 
 @pytest.fixture

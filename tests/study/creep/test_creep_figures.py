@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgb
 from study.creep import figures as figures_creep
 from study.creep.figures import binned_errors, stick_border
 from study.creep.laws import contact_points
-from study.report.legible import save_figure
 from tests.conftest import ROOT
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures import plot_creep
 from wrcore.analysis.pictures.plot_creep import LAW_STYLES
 from wrcore.contact.rolling.ellipse import RollingContact

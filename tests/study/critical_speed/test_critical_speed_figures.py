@@ -6,8 +6,8 @@ import pytest
 
 from study.critical_speed.figures import fig_limit_cycles, fig_root_locus
 from study.critical_speed.tables import loci
-from study.report.legible import save_figure
 from tests.conftest import ELLIPTIC
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_response import fig_modes
 from wrcore.analysis.pictures.style import ACCENT
 from wrcore.analysis.stability.stability import critical_speeds, modes

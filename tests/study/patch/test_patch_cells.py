@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from study.patch import cells
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
 from wrcore.wheels.table.cells import FINER, HARD, YAW, key_of

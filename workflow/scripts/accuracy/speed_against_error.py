@@ -4,10 +4,10 @@ import sys
 
 import pandas as pd
 
-from study.report.legible import save_figure
 from wrcore.analysis.accuracy.choices import front_table, recommendation_table
 from wrcore.analysis.accuracy.models import model_table
 from wrcore.analysis.accuracy.plot_choices import speed_against_error
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 given, titles = snakemake.input, snakemake.params.titles

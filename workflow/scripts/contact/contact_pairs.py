@@ -5,8 +5,8 @@ import sys
 import numpy as np
 
 from study.contact import tables as analysis_contact
-from study.report.legible import save_figure
 from wrcore.analysis.contact import rigid
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures import plot_contact
 from wrcore.analysis.pictures.plot_contact import fig_contact_location
 from wrcore.contact.rigid.first_touch import first_touch

@@ -6,7 +6,7 @@ import numpy as np
 
 from study.contact.figures import fig_planar_error
 from study.contact.tables import planar_error_map, study_pair
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings = snakemake.params.settings

@@ -8,7 +8,7 @@ import pandas as pd
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.contact.reference import compare_with_contact, summarise
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output

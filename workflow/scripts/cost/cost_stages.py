@@ -6,7 +6,7 @@ import pandas as pd
 
 from study.cost.figures import fig_breakdown
 from study.cost.stages import breakdown, limits, with_limits
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

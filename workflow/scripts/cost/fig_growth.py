@@ -5,7 +5,7 @@ import sys
 import pandas as pd
 
 from study.cost.figures import fig_growth
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 given = snakemake.input

@@ -2,8 +2,8 @@
 
 import sys
 
-from study.report.legible import save_figure
 from wrcore.analysis.creep_curves import creep_curves, creep_models
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_creep import fig_creep_curves
 from wrcore.creep.table import load_table
 

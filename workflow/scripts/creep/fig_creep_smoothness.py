@@ -4,8 +4,8 @@ import sys
 
 from study.creep.figures import fig_creep_smoothness
 from study.creep.smoothness import smoothness, smoothness_table
-from study.report.legible import save_figure
 from wrcore.analysis.creep_curves import table_model
+from wrcore.analysis.legible import save_figure
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

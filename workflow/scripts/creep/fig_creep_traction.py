@@ -3,7 +3,7 @@
 import sys
 
 from study.creep.figures import fig_creep_traction
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.contact.rolling.ellipse import RollingContact
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -6,7 +6,7 @@ import pandas as pd
 
 from study.critical_speed.figures import fig_limit_cycles, fig_root_locus
 from study.critical_speed.tables import critical_table
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 titles, given, output = list(snakemake.params.titles.values()), snakemake.input, snakemake.output

@@ -4,7 +4,7 @@ import sys
 
 import pandas as pd
 
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_response import fig_modes
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from study.crossings.figures import fig_nose
 from study.crossings.nose import over_the_nose, summary, wheel_on_crossing
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from study.hard_cases.figures import FIGURES
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 paths = map(Path, snakemake.input.curves)

@@ -6,7 +6,7 @@ import pandas as pd
 
 from study.ivp.figures import fig_ivp_constraints, fig_ivp_work_precision
 from study.ivp.problem import read_problem
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables, output = snakemake.input, snakemake.output

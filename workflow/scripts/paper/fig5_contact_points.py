@@ -3,7 +3,7 @@
 import sys
 
 from study.paper.figures import fig5_contact_points
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.motion import horizons
 from wrcore.run.output.files import load_runs
 from wrcore.scene.description import load_scene

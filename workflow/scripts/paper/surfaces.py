@@ -3,7 +3,7 @@
 import sys
 
 from study.paper.figures import fig1_parametrisation, fig2_profiles, fig3_detection
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

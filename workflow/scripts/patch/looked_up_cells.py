@@ -3,7 +3,7 @@
 import sys
 
 from study.patch.cells import fig_cells, filled_by_run, told
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 source, output = snakemake.input.scene, snakemake.output

@@ -7,7 +7,7 @@ import pandas as pd
 
 from study.contact.tables import study_pair
 from study.patch import figures, tables
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output

@@ -3,7 +3,7 @@
 import sys
 
 from study.contact.tables import study_pair
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -4,8 +4,8 @@ import sys
 
 import pandas as pd
 
-from study.report.legible import save_figure
 from wrcore.analysis.assessment.wheels import wheel_table
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_motion import guiding_forces
 from wrcore.run.output.files import load_run
 

@@ -2,7 +2,7 @@
 
 import sys
 
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_motion import lateral_motion
 from wrcore.run.output.files import load_run
 

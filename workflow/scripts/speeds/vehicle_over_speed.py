@@ -4,9 +4,9 @@ import sys
 
 import pandas as pd
 
-from study.report.legible import save_figure
 from study.speeds.figures import HUNTING, RESPONSE, over_speed
 from study.speeds.tables import cost_table
+from wrcore.analysis.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = dict(zip(snakemake.params.titles.values(), map(pd.read_csv, snakemake.input.speeds), strict=True))

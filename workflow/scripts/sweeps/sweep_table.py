@@ -2,7 +2,7 @@
 
 import sys
 
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.plot_sweep import sweep_scatter
 from wrcore.sweep.batch import gather, load_table
 from wrcore.sweep.plan import load_sweep

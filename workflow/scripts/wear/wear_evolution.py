@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from study.creep_table import plan_with_creep_table
-from study.report.legible import save_figure
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.pictures.plot_wear import plot_evolution
 from wrcore.analysis.wear.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
 

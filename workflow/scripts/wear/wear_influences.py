@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 from study.creep_table import plan_with_creep_table
-from study.report.legible import save_figure
 from study.wear.figures import fig_influences
 from study.wear.influences import influence_table, variant_changes, variant_depth
+from wrcore.analysis.legible import save_figure
 from wrcore.analysis.wear.evolve import load_wear_plan, plan_mark
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -110,8 +110,3 @@ def summarise(comparison):
             values = {"mean": error.mean(), "q90": error.quantile(0.9), "max": error.max()}
             rows.append({"set": name, "reduction": reduction, **counts, "column": column, "quantity": meaning} | values)
     return pd.DataFrame(rows)
-
-
-def longitudinal_excess(comparison, share=0.02, slack=5e-6):
-    """Return the longitudinal error beyond 2 % of the position plus 0.005 mm, m; zero or less meets the requirement."""
-    return comparison.longitudinal_m.abs() - share * comparison.contact_x_m.abs() - slack

@@ -10,9 +10,9 @@ from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from study.report.legible import findings, save_figure
 from tests.synthetic import hunting_run
 from wrcore.analysis.compare import compare
+from wrcore.analysis.legible import findings, save_figure
 from wrcore.analysis.pictures.plot_contact import plot_pair
 from wrcore.analysis.pictures.plot_creep import plot_creep_force
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail
