@@ -67,7 +67,7 @@ def fit_path(
     curvature : str
         Channel with the curvature, 1/m, positive to the left.
     superelevation : str, optional
-        Channel with the height of the left rail above the right one, m.
+        Channel with the height of the left rail above the right one, m. Tangents of a scene have no cant.
     tolerance : float
         Change of curvature, 1/m, below which a segment is a curve, and curvature below which it is a tangent. It should
         be twice the noise of the measurement or more.
@@ -99,14 +99,14 @@ def fit_path(
     if not np.isfinite(values).all():
         raise InputError("fit_path", curvature, "expected a channel with values")
     smooth = zero_phase(values, 1.0 / even.step, (None, min(1.0 / shortest, 0.4 / even.step)))
-    knots, levels = _merged(even.x, values, _divided(even.x, smooth, tolerance), tolerance, shortest)
+    knots, at_knots = _merged(even.x, values, _divided(even.x, smooth, tolerance), tolerance, shortest)
     for _ in range(MOST_FITS):
-        knots, level_of_knot, levels = _with_constant_segments(knots, levels, tolerance)
+        knots, level_of_knot, levels = _with_constant_segments(knots, at_knots, tolerance)
         knots, levels = _fitted(even.x, values, knots, level_of_knot, levels, tolerance)
+        at_knots = levels[level_of_knot]
         if not (np.abs(levels[1:]) < tolerance).any():
-            break
-        levels = levels[level_of_knot]  # a curve of nearly no curvature is a tangent
-    fitted = np.interp(even.x, knots, levels[level_of_knot])
+            break  # else a curve of nearly no curvature becomes a tangent in the next fit
+    fitted = np.interp(even.x, knots, at_knots)
     cants, cant_error = np.zeros(len(levels)), np.nan
     if superelevation is not None:
         heights = without_gaps(even[superelevation])[0]
@@ -120,7 +120,7 @@ def _rms(values):
 
 
 def _divided(x, values, tolerance):
-    """Return ends of straight lines, such that no value is farther off than the tolerance.
+    """Return ends of straight lines, such that the distance of all values from them is within the tolerance.
 
     This is the algorithm of Ramer, Douglas and Peucker with the distance in values."""
     chosen, stack = {0, len(x) - 1}, [(0, len(x) - 1)]
