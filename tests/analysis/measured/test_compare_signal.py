@@ -128,7 +128,7 @@ def test_figures_have_units():
     axes = found.plot("wheelset.y_m").axes
     assert [one.get_ylabel() for one in axes] == ["y / mm", "difference / mm"]
     labels = [one.get_ylabel() for one in found.plot_spectra().axes]
-    assert labels == ["density / (mm)²/(Hz)", "run over measured", "coherence"]
+    assert labels == ["density / (mm)² /Hz", "run over measured", "coherence"]
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from wrcore.analysis.pictures.plot_run import COLORS, HEIGHT, WIDTH, printed
 from wrcore.analysis.pictures.style import plain, styled
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from wrcore.analysis.measured.compare_signal import SignalComparison
 
 AXIS_LABELS = {"t_s": "time / s", "s_m": "distance / m"}
+TRANSFER_SHOWN = (0.1, 10.0)
+"""Quotients of run and measurement that are drawn; beyond them a channel is noise."""
+
 MEASURED, SIMULATED, DIFFERENCE = COLORS[0], COLORS[1], COLORS[2]
 
 
@@ -48,16 +52,21 @@ def plot_spectra(comparison: SignalComparison, channels: Sequence[str]) -> Figur
         table = comparison.spectra(channel).iloc[1:]
         factor, label = printed(channel.rpartition(".")[2])
         quantity = label.partition(" / ")[2]
-        square = f"({quantity})²/({unit})" if quantity else f"1/({unit})"
+        per_unit = "m" if unit == "1/m" else "/Hz"
+        square = f"({quantity.replace('^2', '²')})² {per_unit}" if quantity else f"1 {per_unit}"
         density.loglog(table["frequency"], factor**2 * table["signal"], color=MEASURED)
         density.loglog(table["frequency"], factor**2 * table["run"], color=SIMULATED, linestyle="--")
         density.set(ylabel=f"density / {square}")
         density.set_title(_title(channel), loc="left")
         transfer.loglog(table["frequency"], table["transfer"], color=SIMULATED)
         transfer.axhline(1.0, color="0.6", linewidth=0.8)
-        transfer.set(ylabel="run over measured")
-        coherence.plot(table["frequency"], table["coherence"], color=SIMULATED)
+        transfer.set(ylabel="run over measured", ylim=TRANSFER_SHOWN)
+        coherence.semilogx(table["frequency"], table["coherence"], color=SIMULATED)
         coherence.set(ylabel="coherence", ylim=(0.0, 1.05), xmargin=0)
+        for axis in (density.xaxis, transfer.xaxis, transfer.yaxis, coherence.xaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
     for axes in rows[-1]:
         axes.set_xlabel(f"frequency / {unit}")
     figure.suptitle(plain(f"full: measured, dashed: {comparison.run.source}"), x=0.01, ha="left")
