@@ -24,13 +24,13 @@ SCENES = ROOT / "config" / "scenes"
 
 
 def _with_ellipses():
-    """Return the folder of copies of the examples whose contact is `moment` in place of a lookup table."""
+    """Return the folder of copies of the examples whose contact is `moment` in place of the surrogate."""
     folder = Path(tempfile.mkdtemp(prefix="wrcore-examples-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for part in ("scenes", "vehicles", "sweeps"):
         shutil.copytree(ROOT / "config" / part, folder / part)
     for path in (folder / "scenes").glob("*.yaml"):
-        path.write_text(path.read_text("utf-8").replace("patch: tabulated", "patch: moment"), "utf-8")
+        path.write_text(path.read_text("utf-8").replace("patch: surrogate", "patch: moment"), "utf-8")
     return folder / "scenes"
 
 

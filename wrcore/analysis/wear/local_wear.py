@@ -110,7 +110,7 @@ def local_wear(
     patches : {"ellipse", "exact"}
         Distribution of frictional work: over the ellipses of equal moments, or over exact patches, which are solved
         again in some milliseconds each. Exact patches need the channels ``wheel_motion``. ``contact.patch`` of the run
-        must be exact or tabulated, or moment, whose motion is similar (see `reports/wear.md`). Laws are then
+        must be exact, surrogate, tabulated or moment, whose motion is similar (see `reports/wear.md`). Laws are then
         "sheffield" and "energy".
     resolution : {"coarse", "middle", "fine"}
         Resolution of exact patches.
@@ -161,8 +161,8 @@ def check_motion(scene: Scene, asker: str) -> None:
     """Raise InputError, named by ``asker``, for a patch model whose motion is not similar to that of exact contact."""
     own = scene.data["contact"]["patch"]
     if own == "maximum":
-        expected = "expected exact, tabulated or moment where patches are exact: others move a wheelset in another way"
-        raise InputError(asker, "contact.patch", f"{expected}, got {own}")
+        expected = "expected exact, surrogate, tabulated or moment where patches are exact"
+        raise InputError(asker, "contact.patch", f"{expected}: others move a wheelset in another way; got {own}")
 
 
 def law_on_cells(law: str | dict[str, Any], asker: str) -> Callable[[np.ndarray], np.ndarray]:
