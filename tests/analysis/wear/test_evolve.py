@@ -357,7 +357,7 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"patches": "strips"}, "patches: expected 'ellipse' or 'exact'"),
         (
             {"patches": "exact", "set": {"contact.patch": "maximum"}},
-            "scenes.0.set: .*contact.patch: expected exact, tab",
+            "scenes.0.set: .*contact.patch: expected exact, surrogate, tab",
         ),
         ({"patches": "exact", "law": ARCHARD}, "plan: law: expected one of sheffield, energy"),
         (
