@@ -6,7 +6,7 @@ import pytest
 
 from tests.pages import blocks, run_blocks
 
-NUMBER = re.compile(r"\d+\.\d+")
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 @pytest.mark.parametrize("page", ["contact_models.md", "lubrication.md"])
