@@ -1,4 +1,6 @@
-"""Plot of the contact points of a wheel profile and a rail profile over the lateral position of the wheelset."""
+"""Plots of rigid contact over the lateral position of a wheelset: points, rolling radii, angles, conicity."""
+
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -88,7 +90,7 @@ def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
     return fig_contact_location(pair, first_touch(pair, shifts))
 
 
-STYLES = (
+STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#0072B2", "linestyle": "-"},
     {"color": "#E69F00", "linestyle": (0, (4, 2))},
     {"color": "#009E73", "linestyle": (0, (1, 1))},
@@ -97,7 +99,7 @@ STYLES = (
 """Okabe-Ito colours, each with a different line style, to be distinguished in greyscale."""
 
 
-THIN = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
+THIN: dict[str, Any] = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
 
 
 @styled

@@ -1,7 +1,7 @@
-"""Plot of creep laws: force over creepage."""
+"""Plots of creep laws: force over creepage, for one patch and nondimensional."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -73,7 +73,7 @@ def plot_creep_force(
     return figure
 
 
-LAW_STYLES = {
+LAW_STYLES: dict[str, dict[str, Any]] = {
     "exact": {"label": "exact", "color": "#000000", "marker": "o", "linestyle": "-"},
     "table ellipse": {"label": "table, ellipses", "color": "#0072B2", "marker": "s", "linestyle": (0, (1, 1))},
     "table sdec": {"label": "table, five inputs", "color": "#56B4E9", "marker": "D", "linestyle": (0, (4, 2))},
