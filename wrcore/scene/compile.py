@@ -55,6 +55,26 @@ def compile_scene(
     the equilibrium and the initial state are computed.
     """
     shared = {} if shared is None else shared
+    data, contact = scene.data, scene.data["contact"]
+    model = model_of(scene, progress, shared)
+    track = _track(scene, shared)
+    parts = scene.vehicle, scene.wheel, scene.rail, track, scene.pairs, *scene.changing
+    decisive = (
+        parts, scene.detection, contact["detection_tolerance"], contact["patch"], *contact["material"].values(),
+        *contact["normal"]["damping"].values(), *data["integration"]["baumgarte"].values(),
+        json.dumps(data["track"].get("support")),
+    )  # fmt: skip
+    with meanwhile(model):
+        at_rest = _kept(shared, "equilibrium_positions", decisive, lambda: equilibrium_positions(scene, model))
+        return model, initial_state(scene, model, at_rest, shared)
+
+
+def model_of(scene: Scene, progress: Callable | None = None, shared: dict[Any, Any] | None = None) -> Model:
+    """Return a scene's model for kernels, without the search for its initial state; arguments as for `compile_scene`.
+
+    With exact contact this search takes half a minute for a vehicle with four wheelsets.
+    """
+    shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
@@ -65,7 +85,7 @@ def compile_scene(
             " some hundred times as slow as the table; set contact.patch to moment, or contact.detection to spatial"
         )
     _kept(shared, "laws", (vehicle, scene.laws), lambda: _allow_laws(scene))
-    track = _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
+    track = _track(scene, shared)
     parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # keys of ``shared`` by identity
     friction = scene.friction
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
@@ -83,7 +103,7 @@ def compile_scene(
             warn_of_rigid_rails(scene.source)
     elements = vehicle.elements._replace(states=vehicle.elements.states + scene.support_states)
     scene.try_control_laws()
-    model = Model(
+    return Model(
         vehicle.bodies,
         ContactModel(
             geometry, hertz_table(), LAWS.get(contact["creep"]["model"], USER_LAW),
@@ -107,13 +127,11 @@ def compile_scene(
         friction=friction.rails, flexible_track=scene.support, drive=scene.drive, controls=scene.controls,
         crossing=crossing, check_rails=scene.check_rails,
     )  # fmt: skip
-    decisive = (
-        parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
-        *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
-    )  # fmt: skip
-    with meanwhile(model):
-        at_rest = _kept(shared, "equilibrium_positions", decisive, lambda: equilibrium_positions(scene, model))
-        return model, initial_state(scene, model, at_rest, shared)
+
+
+def _track(scene, shared):
+    """Return the scene's track with the irregularity of its user-defined law."""
+    return _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
 
 
 def _kept(shared, name, key, make):

@@ -19,7 +19,7 @@ from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.output.compute import ON_RAIL
 from wrcore.run.output.run import Run
-from wrcore.scene.compile import compile_scene
+from wrcore.scene.compile import model_of
 from wrcore.scene.description import Scene, Source, load_scene
 from wrcore.wheels.force import press_wheels
 from wrcore.wheels.modes import FRESH
@@ -35,7 +35,7 @@ class _Wheels:
     """The wheels of a scene with one contact model."""
 
     def __init__(self, scene: Scene) -> None:
-        self._equations = Equations(compile_scene(scene)[0])
+        self._equations = Equations(model_of(scene))
 
     def patches(self, motions: np.ndarray) -> list[list[np.ndarray]]:
         """Return the patches (n, PATCH_COLUMNS) of the left and the right wheel of each wheelset, from their motions

@@ -7,8 +7,6 @@ error of the contact model is relative to exact contact, for motions of the same
 from __future__ import annotations
 
 import copy
-import time
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -37,8 +35,8 @@ STRETCH, BUDGET = 2.0, 1.5
 TIGHTER, COST = 1e-2, 3.0
 """Factor on the tolerance of the run, and the factor on computing time that it costs at most (order 4 or 5)."""
 
-TIMES, CONTACT_BUDGET = 20, 2.5
-"""Largest number of times at which exact contact is solved, and the computing time for them after the first one, s."""
+TIMES = 20
+"""Number of output times at which contact is compared with exact contact."""
 
 QUANTITIES = {
     "y": ("lateral position y of wheelsets", "µm", 1e6), "Q": ("vertical force Q of wheels", "N", 1.0),
@@ -153,7 +151,7 @@ def _integration(report: Report, agains: dict[str, Again]) -> Markup:
 
 
 def errors_of_contact(subject: Subject, again: Again | None) -> pd.DataFrame:
-    """Return :func:`wrcore.contact_errors` at as many times as the computing time allows.
+    """Return :func:`wrcore.contact_errors` at `TIMES` output times.
 
     The motions are those of the run if it has the channels ``wheel_motion``, else those of the stretch that was
     integrated again.
@@ -169,21 +167,7 @@ def errors_of_contact(subject: Subject, again: Again | None) -> pd.DataFrame:
                 "report", "run", "expected wheel_motion among the output channels, or a scene that may be run"
             )
         run, scene = again.run, again.scene
-    middle = len(run.t) // 2
-    began = time.perf_counter()  # if kernels have to be compiled, one time remains
-    first = contact_errors(_at(run, [middle]), 1, scene, subject.trust)
-    spent = max(time.perf_counter() - began, 1e-3)
-    count = int(np.clip(CONTACT_BUDGET / spent, 1, min(TIMES, len(run.t))))
-    if count < 2:
-        return first
-    chosen = np.unique(np.linspace(0, len(run.t) - 1, count).round().astype(int))
-    return contact_errors(_at(run, chosen), len(chosen), scene, subject.trust)
-
-
-def _at(run: Run, times: Sequence[int] | np.ndarray) -> Run:
-    """Return a run with some of its output times only."""
-    groups = {name: {key: values[times] for key, values in channels.items()} for name, channels in run.groups.items()}
-    return Run(run.scene, run.status, run.reason, run.t[times], groups, run.counters, run.settings)
+    return contact_errors(run, TIMES, scene, subject.trust)
 
 
 def _contact(report: Report, found: list[tuple[Subject, pd.DataFrame]]) -> Markup:
