@@ -124,7 +124,7 @@ def report(
     >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.2)
     >>> page = wr.report(run, accuracy=False)
     >>> page.sections
-    ('scene', 'figures', 'track', 'motion', 'forces', 'contact', 'wear', 'cost', 'accuracy')
+    ('scene', 'figures', 'track', 'motion', 'forces', 'contact', 'wear', 'cost')
     >>> page.html.count("<script")
     0
     """

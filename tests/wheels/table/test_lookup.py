@@ -648,7 +648,7 @@ def test_an_interrupt_while_equilibrium_is_sought_is_no_lack_of_one(monkeypatch)
     monkeypatch.setattr(pair_store, "_PAIRS", {})
     try:
         with pytest.raises(KeyboardInterrupt):
-            wr.simulate(wr.example("suspended_wheelset"), contact__friction=0.23)
+            wr.simulate(wr.example("suspended_wheelset"), contact__friction=0.23, contact__patch="tabulated")
     finally:
         signal.signal(signal.SIGINT, handler)
 

@@ -137,16 +137,16 @@ def force_modes(z, p, q):
 
 def _mode_splines(z):
     """Coefficients of the force modes' quadratic B-splines with equal steps from -1 to 1."""
-    from scipy.interpolate import make_interp_spline  # takes long to import
-
     nodes = (np.arange(FORCE_CELLS) + 0.5) * 2.0 / FORCE_CELLS - 1.0  # centres of cells, and both ends
     nodes = np.concatenate([[-1.0], nodes, [1.0]])
     p, q = (part.ravel() for part in np.meshgrid(nodes, nodes, indexing="ij"))
     values = force_modes(z, p, q).reshape(len(nodes), len(nodes), 3, -1)
-    knots = (np.arange(-2, FORCE_CELLS + 3)) * 2.0 / FORCE_CELLS - 1.0
-    along = make_interp_spline(nodes, values, k=2, t=knots, axis=0).c
-    both = make_interp_spline(nodes, np.moveaxis(along, 1, 0), k=2, t=knots, axis=0).c
-    return np.ascontiguousarray(np.moveaxis(both, 0, 1))
+    splines = np.zeros((len(nodes), len(nodes)))  # values of the splines at the nodes
+    for i, of_cell in enumerate(splines[1:-1]):
+        of_cell[i : i + 3] = 0.125, 0.75, 0.125
+    splines[0, :2] = splines[-1, -2:] = 0.5
+    inverse = np.linalg.inv(splines)
+    return np.ascontiguousarray(np.einsum("ip,jq,pqck->ijck", inverse, inverse, values, optimize=True))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
