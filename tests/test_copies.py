@@ -62,6 +62,24 @@ def animated():
     return wr.draw(wr.simulate(scene), scene)
 
 
+def measured():
+    run = hunting_run()
+    return wr.Signal("t_s", run.t, {"wheelset.y_m": run["wheelset"].y_m})
+
+
+def fitted():
+    changes = {"integration.duration": 0.4, "contact.patch": "moment", "contact.creep.model": "linear"}
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", changes)
+    run = wr.simulate(scene, initial__y=0.0034)
+    return wr.fit(scene, {"initial.y": (0.001, 0.005)}, wr.Signal("t_s", run.t, {"wheelset.y_m": run["wheelset"].y_m}))
+
+
+def fitted_path():
+    s = np.arange(0.0, 500.0)
+    curvature = np.interp(s, [0, 100, 160, 400, 460, 500], [0, 0, 1 / 600, 1 / 600, 0, 0])
+    return wr.fit_path(wr.Signal("s_m", s, {"curvature_per_m": curvature}))
+
+
 MADE = {
     "Assessment": assessed, "Comparison": lambda: wr.compare(hunting_run(), hunting_run(flange_at=1.0)),
     "CreepTable": wr.ensure_table, "InputError": lambda: InputError("a", "b", "c"),
@@ -70,7 +88,9 @@ MADE = {
     "WheelWear": lambda: wr.WheelWear(*np.ones((4, 3)), 1.0, 2.0), "WheelsetOnTrack": pair,
     "Channels": lambda: hunting_run()["wheelset"], "Channels of a wheel": lambda: hunting_run()["wheelset/left"],
     "Sweep": lambda: wr.load_sweep(ELLIPTIC.parent / "sweeps" / "smoke.yaml"),
-    "Animation": animated,
+    "Animation": animated, "Signal": measured, "Fit": fitted, "FittedPath": fitted_path,
+    "SignalComparison": lambda: wr.compare(hunting_run(), measured()),
+    "ReportPage": lambda: wr.report(hunting_run(), accuracy=False),
 }  # fmt: skip
 """One of each public class, and of what public functions hand out."""
 

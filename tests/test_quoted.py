@@ -136,8 +136,9 @@ def test_whole_table_is_compared_cell_by_cell_and_rewritten():
     assert "| moment | 1.2 | 0.05 | 15 | 0.9 |" in quoted.written(entry, lambda path: other, page)
 
 
-def test_number_of_examples_with_interpolated_contact():
+def test_half_of_the_examples_take_the_surrogate():
     scenes = [yaml.safe_load(path.read_text("utf-8")) for path in (ROOT / "config/scenes").glob("*.yaml")]
-    taking = [scene for scene in scenes if scene.get("contact", {}).get("patch") == "tabulated"]
-    page = " ".join((ROOT / "reports/looked_up.md").read_text("utf-8").split())
-    assert f"{len(taking)} of the {len(scenes)} examples in `config/scenes` take it" in page
+    taking = [scene for scene in scenes if scene.get("contact", {}).get("patch") == "surrogate"]
+    page = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    assert len(scenes) == 2 * len(taking)
+    assert "Half of the examples take exact contact from a trained network (`surrogate`)" in page

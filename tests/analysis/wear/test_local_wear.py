@@ -346,7 +346,9 @@ def test_ellipses_stand_in_where_exact_patches_do_not_carry_the_wheel(monkeypatc
 
 def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
     scene, run = run_with("maximum", **{"integration.duration": 0.02})
-    with pytest.raises(InputError, match=r"contact.patch: expected exact, tabulated or moment where .*got maximum"):
+    with pytest.raises(
+        InputError, match=r"contact.patch: expected exact, surrogate, tabulated or moment where .*got maximum"
+    ):
         local_wear(run, patches="exact", scene=scene)
     with pytest.raises(InputError, match="local_wear: scene: expected that of the run, but contact of it differ"):
         local_wear(run, patches="exact", scene=load_scene(scene, {"contact.patch": "exact"}))
