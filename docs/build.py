@@ -77,7 +77,7 @@ def findings():
         f"`wrcore/run/accuracy_front.csv`):\n\n{front_markdown()}\n",
     ]
     for question, name, heading in FINDINGS:
-        text = section((ROOT / f"reports/{name}.md").read_text("utf-8"), heading)
+        text = guide_text(section((ROOT / f"reports/{name}.md").read_text("utf-8"), heading))
         parts.append(f"## {question}\n\n{text}\n\nFrom [{name}]({name}.md).\n")
     parts.append("## Pictures\n")
     parts += [
