@@ -35,7 +35,7 @@ WIDTHS = (1280, 390)
 """Of a desktop and of a phone, CSS px."""
 
 ANSWERS = {
-    "Y/Q": ("guide/assessment", "Y/Q sliding mean over 2 m the same 0.8"),
+    "Y/Q": ("guide/assessment", "Y/Q the same the same 0.8"),
     "cant deficiency": ("guide/response", "by_deficiency"),
     "Nadal": ("theory/evaluation", "Nadal's limit, which the hard cases are held against, is"),
     "derailment": ("guide/how_runs_end", "a wheelset was more than 50 mm off the track"),
