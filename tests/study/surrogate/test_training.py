@@ -160,3 +160,5 @@ def test_errors_of_held_back_patches_are_those_of_the_weights(random_shards):
     np.testing.assert_allclose(of_force, 5.0, rtol=1e-3)
     found = held_back.table(shipped(), rows)
     assert found["number"][0] == is_held_back(rows["pair"]).sum() and found["N, %"][0] == "2/2/2"
+    trained = held_back.table(shipped(), rows, trained=True)
+    assert trained["number"][0] == (~is_held_back(rows["pair"])).sum() > 0

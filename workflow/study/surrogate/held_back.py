@@ -1,6 +1,6 @@
 """Print the errors of trained weights on the pairs of profiles that are held back from training.
 
-    python -m study.surrogate.held_back FOLDER ... [--weights weights.npz] [--figure errors.png]
+    python -m study.surrogate.held_back FOLDER ... [--weights weights.npz] [--figure errors.png] [--trained]
 
 The table has a row for each class of contact angle, and one for patches with several overlaps. It states the error of
 N, relative to N, and that of the creep force, relative to friction times N, as median / 95 % / 99 %. The figure shows
@@ -39,9 +39,11 @@ def errors(weights, rows):
     return of_load, 100.0 * np.hypot(difference[..., 0], difference[..., 1])
 
 
-def table(weights, rows):
-    """Return the table of errors (pandas.DataFrame) of the held back patches among ``rows``."""
-    held = is_held_back(rows["pair"])
+def table(weights, rows, trained=False):
+    """Return the table of errors (pandas.DataFrame) of the held back patches among ``rows``.
+
+    If ``trained``, of all others, which the training has used."""
+    held = is_held_back(rows["pair"]) != trained
     rows = {name: array[held] for name, array in rows.items()}
     (of_load, of_force), angle = errors(weights, rows), np.abs(rows["angle"])
     classes = {"all": angle >= 0.0} | {name: (angle >= low) & (angle < high) for name, (low, high) in CLASSES.items()}
@@ -100,9 +102,10 @@ def main():
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--weights", type=Path, default=network._WEIGHTS, help="those of the package if left out")
     parser.add_argument("--figure", type=Path, help="file of a figure of the errors, such as errors.png")
+    parser.add_argument("--trained", action="store_true", help="errors on the patches that are not held back")
     asked = parser.parse_args()
     weights, rows = shards.read(asked.weights), joined(asked.folders)[0]
-    print(table(weights, rows).to_markdown(index=False))
+    print(table(weights, rows, asked.trained).to_markdown(index=False))
     if asked.figure:
         figure(weights, rows).savefig(asked.figure)
 
